@@ -50,17 +50,31 @@ pub trait Parameters: DeserializeOwned {
 /// All errors of `parameters`, read as a `P`. None follows from another: of a value that is missing or does not go with others, only
 /// the first error counts.
 pub(crate) fn faults<P: Parameters>(parameters: &Value) -> Vec<ParameterError> {
+    faults_within::<P>(&mut parameters.clone())
+}
+
+/// `parameters` without those that [`faults`] refuses; `None` if no `P` can be read without them.
+pub(crate) fn without_faults<P: Parameters>(parameters: &Value) -> Option<Value> {
     let mut rest = parameters.clone();
+    for error in faults_within::<P>(&mut rest) {
+        remove(&mut rest, error.key());
+    }
+    let read = diagnostics::read::<P>(&rest).ok()?;
+    read.out_of_range().is_empty().then_some(rest)
+}
+
+/// As [`faults`]; removes the values that cannot be read.
+fn faults_within<P: Parameters>(rest: &mut Value) -> Vec<ParameterError> {
     let mut errors: Vec<ParameterError> = Vec::new();
     loop {
-        let error = match diagnostics::read::<P>(&rest) {
+        let error = match diagnostics::read::<P>(rest) {
             Ok(read) => {
-                errors.extend(read.out_of_range());
+                errors.extend(read.out_of_range().into_iter().flat_map(ParameterError::into_each));
                 return errors;
             }
             Err(error) => error,
         };
-        let is_removed = remove(&mut rest, error.key());
+        let is_removed = remove(rest, error.key());
         if errors.is_empty() || matches!(error, ParameterError::Unknown { .. } | ParameterError::Value { .. })
         {
             errors.push(error);
@@ -292,6 +306,16 @@ mod tests {
         assert_eq!(keys(json!({ "main": { "rate_hz": "x" } })), ["main.rate_hz"]);
         assert_eq!(keys(json!({ "named": { "a.b": { "rate_hz": [] } } })), ["named.a.b.rate_hz"]);
         assert_eq!(keys(json!({ "streams": [3], "one": 1 })).len(), 2);
+    }
+
+    #[test]
+    fn parameters_without_their_faults_can_be_read() {
+        let rest = |value| super::without_faults::<Gains>(&value);
+        let given = json!({ "self": 2, "one": 1, "main": { "rate_hz": 2.0 } });
+        assert_eq!(rest(given), Some(json!({ "self": 2, "main": { "rate_hz": 2.0 } })));
+        let ranges = json!({ "self": 2, "streams": [{ "rate_hz": 1.0 }, { "rate_hz": 0.0 }] });
+        assert_eq!(rest(ranges), None, "the table has no default for it");
+        assert_eq!(super::without_faults::<Stream>(&json!({ "rate_hz": "x" })), None);
     }
 
     #[test]

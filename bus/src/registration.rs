@@ -41,6 +41,7 @@ pub struct Registration {
     sample_ticks: fn(&Value, u64, u32) -> Option<SampleTicks>,
     check: fn(&Value, &NodeContext<'_>) -> Result<(), ParameterError>,
     faults: fn(&Value) -> Vec<ParameterError>,
+    without_faults: fn(&Value) -> Option<Value>,
     make: Make,
 }
 
@@ -72,6 +73,7 @@ impl Registration {
             },
             check: |parameters, context| make::<C>(parameters, context)?.rehearse(context),
             faults: parameters::faults::<C::Parameters>,
+            without_faults: parameters::without_faults::<C::Parameters>,
             make: |parameters, context| {
                 let component = make::<C>(parameters, context)?;
                 Ok(Box::new(Made { state: component.initial(), component }))
@@ -101,7 +103,8 @@ impl Registration {
     /// Checks `parameters` and the files that they name for a node, without running it.
     ///
     /// # Errors
-    /// The parameter or file that is not valid.
+    /// The first of [`Self::faults`]; without those, the parameters and files that are not valid or do not go together,
+    /// as far as one does not follow from another.
     pub fn check(&self, parameters: &Value, context: &NodeContext<'_>) -> Result<(), ParameterError> {
         (self.check)(parameters, context)
     }
@@ -111,6 +114,15 @@ impl Registration {
     #[must_use]
     pub fn faults(&self, parameters: &Value) -> Vec<ParameterError> {
         (self.faults)(parameters)
+    }
+
+    /// All faults of the files that `parameters` name for a node, although others of `parameters` are faulty. `context` gets warnings
+    /// that may follow from the faults.
+    #[must_use]
+    pub fn faults_of_files(&self, parameters: &Value, context: &NodeContext<'_>) -> Vec<ParameterError> {
+        let Some(rest) = (self.without_faults)(parameters) else { return Vec::new() };
+        let errors = (self.check)(&rest, context).err().map_or(Vec::new(), ParameterError::into_each);
+        errors.into_iter().filter(|error| matches!(error, ParameterError::File { .. })).collect()
     }
 
     /// True if the component, as `node` of `plan`, goes on in flight from the state of `before` as `node_before`; the run has read

@@ -12,6 +12,8 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{ControlStatus, MotorCommand};
 use diagnostics::ParameterError;
+use vehicles::Vehicle;
+use vehicles::reference::HUMMINGBIRD;
 
 /// Outputs of every controller.
 #[derive(Debug, OutputPorts)]
@@ -54,7 +56,8 @@ impl<L: Law> Component for Controller<L> {
     type State = ControllerState;
 
     fn new(parameters: L::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let craft = ControlledVehicle::load(&context.files, L::vehicle(&parameters))?;
+        let craft = ControlledVehicle::load(&context.files, L::vehicle(&parameters))
+            .map_err(|fault| fault.and(faults_of_files::<L>(&parameters, context)))?;
         let law = L::new(&parameters, &LawContext { craft: &craft, node: context })?;
         let transfer = BumplessTransfer::to::<L>(&craft.vehicle, context.period_s());
         Ok(Self { law, craft, transfer })
@@ -87,6 +90,19 @@ impl<L: Law> Component for Controller<L> {
             status: Some(report(&output, &allocated)),
         })
     }
+}
+
+/// Faults of the files that `parameters` name beside a vehicle file that is refused: the law is made for another vehicle.
+fn faults_of_files<L: Law>(parameters: &L::Parameters, context: &NodeContext<'_>) -> Vec<ParameterError> {
+    let vehicle = Vehicle::parse(HUMMINGBIRD, "hummingbird.toml").ok();
+    let Some(craft) = vehicle.and_then(|vehicle| ControlledVehicle::new(vehicle).ok()) else {
+        return Vec::new();
+    };
+    // Its warnings are about that vehicle.
+    let node = context.clone();
+    let made = L::new(parameters, &LawContext { craft: &craft, node: &node });
+    let errors = made.err().map_or(Vec::new(), ParameterError::into_each);
+    errors.into_iter().filter(|error| matches!(error, ParameterError::File { .. })).collect()
 }
 
 impl<L> Controller<L> {

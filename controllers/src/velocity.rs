@@ -297,8 +297,9 @@ impl Law for VelocityLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        parameters.check(context.node.has("reference"))?;
-        let gains = LoopsGains::load(&context.node.files, parameters.gains.as_deref())?;
+        let gains = LoopsGains::load(&context.node.files, parameters.gains.as_deref());
+        let checked = parameters.check(context.node.has("reference"));
+        let (gains, ()) = ParameterError::both(gains, checked)?;
         let velocity = VelocityLoop::new(&gains, context.craft.hover_model(), context.node.period_s());
         Ok(Self { velocity, constant: parameters.constant() })
     }

@@ -58,6 +58,9 @@ pub enum ParameterError {
         /// The faults.
         faults: Box<FileFaults>,
     },
+    /// Several refused parameters, in one error; [`Self::into_each`] takes them apart.
+    #[error("{}", lines(.0))]
+    Several(Vec<Self>),
 }
 
 /// Faults of a file that a parameter names.
@@ -140,11 +143,73 @@ impl ParameterError {
         Self::Conflict { key: key.into(), message: message.to_string() }
     }
 
+    /// Gathers the results of all `checks`, which do not depend on each other.
+    ///
+    /// ```
+    /// use diagnostics::ParameterError;
+    /// use diagnostics::parameter::positive;
+    ///
+    /// let checks = [positive("mass_kg", -1.0), positive("span_m", 0.2), positive("rate_hz", 0.0)];
+    /// let error = ParameterError::gather(checks).unwrap_err();
+    /// let keys: Vec<String> = error.into_each().iter().map(|error| error.key().to_owned()).collect();
+    /// assert_eq!(keys, ["mass_kg", "rate_hz"]);
+    /// ```
+    ///
+    /// # Errors
+    /// The errors of all checks, as one.
+    pub fn gather<T>(checks: impl IntoIterator<Item = Result<T, Self>>) -> Result<Vec<T>, Self> {
+        let (mut passed, mut errors) = (Vec::new(), Vec::new());
+        for check in checks {
+            match check {
+                Ok(value) => passed.push(value),
+                Err(error) => errors.push(error),
+            }
+        }
+        let mut errors = errors.into_iter();
+        match errors.next() {
+            Some(first) => Err(first.and(errors)),
+            None => Ok(passed),
+        }
+    }
+
+    /// Gathers the results of two checks, which do not depend on each other.
+    ///
+    /// # Errors
+    /// The errors of both, as one.
+    pub fn both<A, B>(first: Result<A, Self>, second: Result<B, Self>) -> Result<(A, B), Self> {
+        match (first, second) {
+            (Ok(first), Ok(second)) => Ok((first, second)),
+            (Err(first), Err(second)) => Err(first.and([second])),
+            (Err(error), Ok(_)) | (Ok(_), Err(error)) => Err(error),
+        }
+    }
+
+    /// This error, and `others` beside it.
+    #[must_use]
+    pub fn and(self, others: impl IntoIterator<Item = Self>) -> Self {
+        let mut each = self.into_each();
+        each.extend(others.into_iter().flat_map(Self::into_each));
+        match each.len() {
+            1 => each.remove(0),
+            _ => Self::Several(each),
+        }
+    }
+
+    /// The errors that this one holds, each on its own.
+    #[must_use]
+    pub fn into_each(self) -> Vec<Self> {
+        match self {
+            Self::Several(errors) => errors.into_iter().flat_map(Self::into_each).collect(),
+            error => vec![error],
+        }
+    }
+
     /// The same of the component `who`.
     #[must_use]
     pub fn of(self, who: impl Into<String>) -> Self {
         let who = who.into();
         match self {
+            Self::Several(errors) => Self::Several(errors.into_iter().map(|error| error.of(&*who)).collect()),
             Self::File { key, mut faults } => {
                 faults.who = if faults.who.is_empty() { who } else { format!("{who}: {}", faults.who) };
                 Self::File { key, faults }
@@ -153,15 +218,17 @@ impl ParameterError {
         }
     }
 
-    /// The dotted key that is to blame; empty where none is in particular.
+    /// The dotted key that is to blame, of several errors that of the first; empty where none is in particular.
     #[must_use]
     pub fn key(&self) -> &str {
-        let (Self::Value { key, .. }
-        | Self::Missing { key, .. }
-        | Self::Unknown { key, .. }
-        | Self::File { key, .. }
-        | Self::Conflict { key, .. }) = self;
-        key
+        match self {
+            Self::Value { key, .. }
+            | Self::Missing { key, .. }
+            | Self::Unknown { key, .. }
+            | Self::File { key, .. }
+            | Self::Conflict { key, .. } => key,
+            Self::Several(errors) => errors.first().map_or("", Self::key),
+        }
     }
 
     /// Returns advice; empty where the message says what to do.
@@ -173,7 +240,7 @@ impl ParameterError {
                 self.suggestion().unwrap_or_else(|| "remove it, or correct its spelling".to_owned())
             }
             Self::Value { .. } => self.suggestion().unwrap_or_default(),
-            Self::File { .. } | Self::Conflict { .. } => String::new(),
+            Self::File { .. } | Self::Conflict { .. } | Self::Several(_) => String::new(),
         }
     }
 
@@ -231,22 +298,33 @@ impl ParameterError {
     /// ```
     #[must_use]
     pub fn reworded(mut self, reword: impl Fn(&str) -> String) -> Self {
-        match &mut self {
+        self.reword(&reword);
+        self
+    }
+
+    fn reword(&mut self, reword: &impl Fn(&str) -> String) {
+        match self {
             Self::Conflict { message, .. } => *message = reword(message),
-            Self::File { faults, .. } => faults.each.iter_mut().for_each(|fault| fault.reword(&reword)),
+            Self::File { faults, .. } => faults.each.iter_mut().for_each(|fault| fault.reword(reword)),
+            Self::Several(errors) => errors.iter_mut().for_each(|error| error.reword(reword)),
             Self::Value { .. } | Self::Missing { .. } | Self::Unknown { .. } => {}
         }
-        self
     }
 
     /// The same error of the parameter within the table `table`.
     #[must_use]
     pub fn within(mut self, table: &str) -> Self {
-        let (Self::Value { key, .. }
-        | Self::Missing { key, .. }
-        | Self::Unknown { key, .. }
-        | Self::File { key, .. }
-        | Self::Conflict { key, .. }) = &mut self;
+        let key = match &mut self {
+            Self::Value { key, .. }
+            | Self::Missing { key, .. }
+            | Self::Unknown { key, .. }
+            | Self::File { key, .. }
+            | Self::Conflict { key, .. } => key,
+            Self::Several(errors) => {
+                let each = std::mem::take(errors).into_iter().map(|error| error.within(table));
+                return Self::Several(each.collect());
+            }
+        };
         let told = format!("`{key}`: ");
         *key = if key.is_empty() { table.to_owned() } else { format!("{table}.{key}") };
         let whole = key.clone();
@@ -294,6 +372,11 @@ fn choices(expected: &str) -> Option<Vec<&str>> {
 /// The texts between quotes of `text`, of either kind.
 fn quoted(text: &str) -> Vec<&str> {
     text.split(['`', '"']).skip(1).step_by(2).collect()
+}
+
+/// The texts of `errors`, a line each.
+fn lines(errors: &[ParameterError]) -> String {
+    errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 fn list(names: &[String]) -> String {
@@ -487,6 +570,21 @@ mod tests {
             |found: &str| ParameterError::value("channels", "one of `position`, `attitude`", found).help();
         assert_eq!(value("`positoin`"), "did you mean `position`?");
         assert_eq!(value("3"), "");
+    }
+
+    #[test]
+    fn several_errors_are_one_until_they_are_taken_apart() {
+        let checks = || [positive("a", -1.0), finite("b", 1.0), finite("c", f64::NAN)];
+        let error = ParameterError::gather(checks()).unwrap_err().within("table");
+        let told = "`table.a` must be a finite number above 0, found -1\n\
+                    `table.c` must be a finite number, found NaN";
+        assert_eq!((error.key(), error.to_string().as_str()), ("table.a", told));
+        assert_eq!(error.clone().and([error]).into_each().len(), 4);
+        assert_eq!(ParameterError::gather([positive("a", -1.0)]), Err(positive("a", -1.0).unwrap_err()));
+        assert_eq!(ParameterError::gather([Ok(1), Ok(2)]), Ok(vec![1, 2]));
+        let both = ParameterError::both(positive("a", 0.0), finite("b", f64::NAN)).unwrap_err();
+        let named = both.of("plant").into_each();
+        assert!(named.iter().all(|error| error.to_string().starts_with("plant: ")), "{named:?}");
     }
 
     #[test]

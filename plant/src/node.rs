@@ -66,8 +66,10 @@ impl Component for Plant {
     type State = PlantMemory;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let (dt_s, origin) = (context.tick_s(), parameters.origin(context)?);
-        let (frame, window_ticks) = (frame_of(context.name)?, parameters.window_ticks(dt_s)?);
+        let dt_s = context.tick_s();
+        let names_and_ticks = ParameterError::both(frame_of(context.name), parameters.window_ticks(dt_s));
+        let made = ParameterError::both(parameters.origin(context), names_and_ticks)?;
+        let (origin, (frame, window_ticks)) = made;
         Ok(Self { origin, frame, window_ticks, dt_s })
     }
 

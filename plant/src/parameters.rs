@@ -16,7 +16,7 @@ use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Mesh, Scene};
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use vehicles::{EffectEntry, Vehicle};
 
 /// Parameters of the plant.
@@ -150,12 +150,14 @@ impl Parameters {
             (is_measured && !has_window, "window_s", "the input `measured` needs the parameter `window_s`"),
             (!is_measured && has_window, "window_s", "the parameter `window_s` needs the input `measured`"),
         ];
-        conflicts.into_iter().try_for_each(|(is_wrong, key, message)| refuse(is_wrong, key, || message))?;
+        let conflicts =
+            conflicts.into_iter().map(|(is_wrong, key, message)| refuse(is_wrong, key, || message));
         // A plant that ran less often would apply a command before it was computed.
         let ticks = run.period_ticks;
-        refuse(ticks != 1, "period_ticks", || {
+        let period = refuse(ticks != 1, "period_ticks", || {
             format!("`period_ticks` is {ticks}, expected 1: a plant runs at every tick; leave it out")
-        })
+        });
+        ParameterError::gather(conflicts.chain([period])).map(drop)
     }
 
     /// Ticks of `tick_s` between two settings to the measured state; longer than any run without.
@@ -176,23 +178,22 @@ impl Parameters {
     /// seed and the node's name.
     ///
     /// # Errors
-    /// The invalid parameter, or the reason why the vehicle cannot fly.
+    /// The invalid parameters and files; without those, the reasons why the vehicle cannot fly.
     pub(crate) fn origin(&self, run: &NodeContext<'_>) -> Result<Origin, ParameterError> {
-        self.check(run)?;
-        let (airframe, scene) = self.airframe(&run.files)?;
-        self.refuse_ports(&scene, run)?;
-        refuse_initial(airframe.vehicle(), run)?;
+        let ((), (airframe, scene)) = ParameterError::both(self.check(run), self.airframe(&run.files))?;
+        let ports = self.refuse_ports(&scene, run);
+        let initial = refuse_initial(airframe.vehicle(), run);
         // Before the backend, which a vehicle that is none might not survive.
         airworthy::tell_unsourced(airframe.vehicle(), run);
         odd::tell(&airframe, run);
         scene.meshes.iter().filter_map(Mesh::doubt).for_each(|doubt| run.warn("scene", doubt));
         beyond::tell(airframe.vehicle(), airframe.effects(), &self.start(), run);
-        airworthy::check_rotor_inertia(airframe.vehicle())?;
+        let inertia = airworthy::check_rotor_inertia(airframe.vehicle());
         let dt_s = run.tick_s() / f64::from(self.substeps);
-        airworthy::check_steps(airframe.vehicle(), dt_s, run)?;
-        if scene.rig.is_none() && self.window_s.is_none() {
-            airworthy::check_lift(airframe.vehicle(), run)?;
-        }
+        let steps = airworthy::check_steps(airframe.vehicle(), dt_s, run);
+        let is_lifted = scene.rig.is_none() && self.window_s.is_none();
+        let lift = if is_lifted { airworthy::check_lift(airframe.vehicle(), run) } else { Ok(()) };
+        ParameterError::gather([ports, initial, inertia, steps, lift])?;
         let effects = airframe.initial_state(run.seed, run.name, run.tick_s());
         let model = NewtonEuler::flying(airframe, self.substeps);
         let origin = Origin { model, effects, scene, start: self.start(), physics: self.physics() };
@@ -218,34 +219,38 @@ impl Parameters {
             self.refuse_inside(&rapier, scene)?;
             return self.refuse_bodies(&mut rapier, scene, dt_s);
         }
-        if self.scene.is_some() {
-            self.refuse_below_ground(scene)?;
-        }
+        let ground = if self.scene.is_some() { self.refuse_below_ground(scene) } else { Ok(()) };
         let has_bodies = scene.bodies().next().is_some() || !scene.joints.is_empty();
-        refuse(has_bodies, "scene", || {
+        let bodies = refuse(has_bodies, "scene", || {
             let name = &scene.name;
             format!(
                 "`scene` \"{name}\" holds free bodies or joints, which need `backend` = \"rapier\": newton-euler moves the vehicle \
                  alone"
             )
-        })?;
-        refuse(scene.rig.is_some(), "scene", || {
+        });
+        let rig = refuse(scene.rig.is_some(), "scene", || {
             let name = &scene.name;
             format!(
                 "`scene` \"{name}\" holds a rig, which needs `backend` = \"rapier\": newton-euler flies freely"
             )
-        })
+        });
+        ParameterError::gather([ground, bodies, rig]).map(drop)
     }
 
     /// The vehicle as it flies, and the scene around it.
     fn airframe(&self, files: &InputFiles) -> Result<(Airframe, Scene), ParameterError> {
-        let refused = |error: Diagnostic| error.named_by("vehicle");
-        let vehicle = Vehicle::load_from(files, &self.vehicle).map_err(refused)?;
-        let scene =
-            self.scene.as_deref().map_or_else(|| Ok(Scene::default()), |path| Scene::load_from(files, path));
-        let scene = scene.map_err(|error| error.named_by("scene"))?;
-        refuse_double_rig(&vehicle, &scene)?;
-        Ok((Airframe::from_files(vehicle, &scene.effects).map_err(refused)?, scene))
+        let vehicle = Vehicle::load_from(files, &self.vehicle);
+        let vehicle = vehicle.map_err(|error| with_effects(error, files, &self.vehicle).named_by("vehicle"));
+        let load = |path| {
+            let scene = Scene::load_from(files, path);
+            scene.map_err(|error| with_effects(error, files, path).named_by("scene"))
+        };
+        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), load);
+        let (vehicle, scene) = ParameterError::both(vehicle, scene)?;
+        let rig = refuse_double_rig(&vehicle, &scene);
+        let airframe = Airframe::from_files(vehicle, &scene.effects);
+        let airframe = airframe.map_err(|error| error.named_by("vehicle"));
+        ParameterError::both(airframe, rig).map(|(airframe, ())| (airframe, scene))
     }
 
     /// Refuses a start below the ground, unless a measured flight gives the start or a rig holds the vehicle.
@@ -337,6 +342,14 @@ impl Parameters {
         let attitude_WB = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
         RigidBody { velocity_W_m_s, attitude_WB, ..RigidBody::level_at(self.initial_position_m.into()) }
     }
+}
+
+/// The faults of the file at `path`, with those of its effects in the catalogue, which the reader of the file does not have.
+fn with_effects(fault: Diagnostic, files: &InputFiles, path: &Path) -> Diagnostic {
+    let text = files.text(path).unwrap_or_default();
+    let entries = vehicles::effects::entries(&text, &path.display().to_string());
+    let checked = effects::entry::resolve(&entries).map(drop);
+    Diagnostic::gather([Err(fault.clone()), checked]).err().unwrap_or(fault)
 }
 
 /// Refuses effects that model the joints of a rig, if the scene has one.

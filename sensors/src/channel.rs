@@ -48,20 +48,22 @@ impl Timing {
     /// # Errors
     /// A parameter is outside its range.
     pub fn validate(&self) -> Result<(), ParameterError> {
-        positive("rate_hz", self.rate_hz)?;
-        not_negative("delay_ms", self.delay_ms)?;
-        let dropout_is_good = (0.0..1.0).contains(&self.dropout);
-        require("dropout", self.dropout, dropout_is_good, "a fraction from 0 to below 1")?;
-        not_negative("dropout_mean_s", self.dropout_mean_s)?;
+        ParameterError::gather([
+            positive("rate_hz", self.rate_hz),
+            not_negative("delay_ms", self.delay_ms),
+            fraction_lost("dropout", self.dropout),
+            not_negative("dropout_mean_s", self.dropout_mean_s),
+        ])?;
         let (longest_ms, rate_hz) = (UNDER_WAY_MAX / self.rate_hz * 1e3, self.rate_hz);
         let expected = format!(
             "at most {longest_ms} ms: at {rate_hz} Hz {UNDER_WAY_MAX} measurements are under way then"
         );
-        require("delay_ms", self.delay_ms, self.under_way() <= UNDER_WAY_MAX, &expected)?;
+        let delay = require("delay_ms", self.delay_ms, self.under_way() <= UNDER_WAY_MAX, &expected);
         let losses = Losses::new(self);
         let mean_is_good = losses.begin <= 1.0 && losses.stay >= 0.0;
         let expected = "zero, or long enough for one measurement and for the fraction `dropout` of them";
-        require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected)
+        let mean = require("dropout_mean_s", self.dropout_mean_s, mean_is_good, expected);
+        ParameterError::both(delay, mean).map(drop)
     }
 
     /// The longest period of a node, in ticks of `tick_ns`, at which measurements are made and arrive at the very ticks at which they
@@ -126,6 +128,11 @@ impl Timing {
         }
         Ok(())
     }
+}
+
+/// Passes a fraction of measurements that are lost.
+pub(crate) fn fraction_lost(key: &str, fraction: f64) -> Result<(), ParameterError> {
+    require(key, fraction, (0.0..1.0).contains(&fraction), "a fraction from 0 to below 1")
 }
 
 fn greatest_common_divisor(a: u32, b: u32) -> u32 {

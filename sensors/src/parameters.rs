@@ -21,7 +21,7 @@ macro_rules! timed_parameters {
             #[parameter(default = $delay_ms, check = diagnostics::parameter::not_negative)]
             pub delay_ms: f64,
             /// Fraction of the measurements that are lost.
-            #[parameter(default = 0.0, range = "0 to below 1")]
+            #[parameter(default = 0.0, range = "0 to below 1", check = crate::channel::fraction_lost)]
             pub dropout: f64,
             /// Mean duration of losses; 0: each is independent of the one before.
             #[parameter(default = 0.0, check = diagnostics::parameter::not_negative)]

@@ -247,8 +247,9 @@ impl Sensor for RangeFinders {
 
     fn made_of(params: RangeParams, files: &InputFiles) -> Result<Self, ParameterError> {
         let nearest_is_good = (0.0..params.reach_m).contains(&params.nearest_m);
-        require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`")?;
-        let scene = caster(files, params.scene.as_deref())?;
+        let nearest =
+            require("nearest_m", params.nearest_m, nearest_is_good, "zero or more and below `reach_m`");
+        let (scene, ()) = ParameterError::both(caster(files, params.scene.as_deref()), nearest)?;
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         let half_angle_rad = params.half_angle_deg.to_radians();
         let cones = [x, -x, y, -y, -z].map(|axis_B| Cone::new(axis_B, half_angle_rad));

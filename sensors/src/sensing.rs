@@ -180,8 +180,9 @@ impl<S: Sensor> Component for Sensing<S> {
     type State = Queued<S::State>;
 
     fn new(parameters: S::Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let channel = Channel::new(&parameters.timing(), context)?;
-        let sensor = S::made_of(parameters, &context.files)?.in_run(context)?;
+        let channel = Channel::new(&parameters.timing(), context);
+        let sensor = S::made_of(parameters, &context.files).and_then(|sensor| sensor.in_run(context));
+        let (channel, sensor) = ParameterError::both(channel, sensor)?;
         Ok(Self { sensor, channel })
     }
 

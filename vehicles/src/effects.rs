@@ -4,7 +4,7 @@
 //! (`plant::effects`): here any name will do.
 
 use crate::provenance::Stated;
-use crate::reader::Section;
+use crate::reader::{Document, Section};
 use diagnostics::{Diagnostic, Faults, Place};
 
 /// One `[[effects]]` table.
@@ -38,6 +38,16 @@ pub struct EffectEntry {
 /// A table without a name, or with a key that is not a number with unit, source and uncertainty.
 pub fn read(root: &Section) -> Result<Vec<EffectEntry>, Diagnostic> {
     Diagnostic::gather(root.sections_if_any("effects")?.iter().map(one_effect))
+}
+
+/// The effects in the `text` of a file of which other tables may be faulty; effects with faults of their own are left out.
+#[must_use]
+pub fn entries(text: &str, file_name: &str) -> Vec<EffectEntry> {
+    let doc = Document::new(file_name, text);
+    let Ok(tree) = doc.tree() else { return Vec::new() };
+    let root = Section::new(&doc, String::new(), 0..0, tree.get_ref());
+    let sections = root.sections_if_any("effects").unwrap_or_default();
+    sections.iter().filter_map(|section| one_effect(section).ok()).collect()
 }
 
 fn one_effect(section: &Section) -> Result<EffectEntry, Diagnostic> {

@@ -213,7 +213,7 @@ fn check_component(
     let errors = match ranges.is_ok().then(|| kind.check(parameters, context)) {
         None => kind.faults(parameters),
         Some(Ok(())) => Vec::new(),
-        Some(Err(first)) => all_errors(kind, parameters, first, scope),
+        Some(Err(told)) => all_errors(kind, parameters, context, told, scope),
     };
     beside(ranges, Diagnostic::gather(errors.into_iter().map(refused)).map(drop))
 }
@@ -256,17 +256,27 @@ fn stated<'a>(declared: &DeclaredNode<'a>) -> Result<BTreeMap<&'a str, serde_jso
     declared.process.parameters.iter().map(of).collect()
 }
 
-/// The errors of `parameters`, which `kind` refuses for the `first` of them.
+/// The errors of `parameters`, which `kind` refuses as `told` says.
 fn all_errors(
     kind: &Registration,
     parameters: &serde_json::Value,
-    first: ParameterError,
+    context: &NodeContext<'_>,
+    told: ParameterError,
     scope: Scope,
 ) -> Vec<ParameterError> {
-    let mut errors = kind.faults(parameters);
-    let is_told = scope == Scope::All || matches!(first, ParameterError::File { .. });
-    if is_told && !errors.contains(&first) {
-        errors.insert(0, first);
+    let faults = kind.faults(parameters);
+    let of_files = match faults.is_empty() {
+        true => Vec::new(),
+        // Warnings and times of parameters that nobody wrote are those of another node.
+        false => kind.faults_of_files(parameters, &context.clone()),
+    };
+    let is_of_file = |error: &ParameterError| matches!(error, ParameterError::File { .. });
+    let told = told.into_each().into_iter().filter(|error| scope == Scope::All || is_of_file(error));
+    let mut errors: Vec<ParameterError> = Vec::new();
+    for error in told.chain(faults).chain(of_files) {
+        if !errors.contains(&error) {
+            errors.push(error);
+        }
     }
     errors
 }
