@@ -154,23 +154,25 @@ impl Component for Operator {
         let Parameters { initial_altitude_m, altitudes_m, tilt_max_deg, fallback, data, topic } = parameters;
         let [lowest_m, highest_m] = altitudes_m;
         let is_range = lowest_m < highest_m && lowest_m.abs().max(highest_m.abs()) <= ALTITUDE_MAX_M;
-        refuse(!is_range, "altitudes_m", || {
+        let range = refuse(!is_range, "altitudes_m", || {
             format!(
                 "`altitudes_m` is [{lowest_m}, {highest_m}], expected the lowest and the highest altitude, of at most {ALTITUDE_MAX_M} m"
             )
-        })?;
-        refuse(!(lowest_m..=highest_m).contains(&initial_altitude_m), "initial_altitude_m", || {
+        });
+        let is_outside = is_range && !(lowest_m..=highest_m).contains(&initial_altitude_m);
+        let start = refuse(is_outside, "initial_altitude_m", || {
             format!(
                 "`initial_altitude_m` is {initial_altitude_m} m, expected one within `altitudes_m`, {lowest_m} m to {highest_m} m"
             )
-        })?;
-        refuse(topic.is_some() && data.is_none(), "topic", || {
+        });
+        let named = refuse(topic.is_some() && data.is_none(), "topic", || {
             "`topic` names set points in no recording: add `data`, the recording".to_owned()
-        })?;
+        });
         let source = match data {
-            Some(path) => Source::Flight(Flight::read(&path, topic.as_deref(), context)?),
-            None => Source::Person(file(context)?),
+            Some(path) => Flight::read(&path, topic.as_deref(), context).map(Source::Flight),
+            None => file(context).map(Source::Person),
         };
+        let (_, source) = ParameterError::both(ParameterError::gather([range, start, named]), source)?;
         Ok(Self {
             initial_altitude_m,
             altitudes_m,

@@ -65,13 +65,36 @@ pub(crate) fn without_faults<P: Parameters>(parameters: &Value) -> Option<Value>
 
 /// As [`faults`]; removes the values that cannot be read.
 fn faults_within<P: Parameters>(rest: &mut Value) -> Vec<ParameterError> {
+    let (read, mut errors) = readable::<P>(rest);
+    let out_of_range = read.map_or(Vec::new(), |read| read.out_of_range());
+    errors.extend(out_of_range.into_iter().flat_map(ParameterError::into_each));
+    errors
+}
+
+/// Reads a table within parameters, which they hold as a [`Value`].
+///
+/// ```
+/// let table = serde_json::json!({ "roll": "x", "pitch": 1.0, "yaw": true });
+/// let read = bus::parameters::read::<std::collections::BTreeMap<String, f64>>(&table);
+/// let keys: Vec<String> = read.unwrap_err().into_each().iter().map(|error| error.key().to_owned()).collect();
+/// assert_eq!(keys, ["roll", "yaw"]);
+/// ```
+///
+/// # Errors
+/// All values that cannot be read, in one error. None follows from another.
+pub fn read<T: DeserializeOwned>(value: &Value) -> Result<T, ParameterError> {
+    diagnostics::read(value).map_err(|first| {
+        let (_, errors) = readable::<T>(&mut value.clone());
+        first.and(errors.into_iter().skip(1))
+    })
+}
+
+/// The `T` that `rest` holds once all values that cannot be read are removed, and their errors; `None` if there is none then.
+fn readable<T: DeserializeOwned>(rest: &mut Value) -> (Option<T>, Vec<ParameterError>) {
     let mut errors: Vec<ParameterError> = Vec::new();
     loop {
-        let error = match diagnostics::read::<P>(rest) {
-            Ok(read) => {
-                errors.extend(read.out_of_range().into_iter().flat_map(ParameterError::into_each));
-                return errors;
-            }
+        let error = match diagnostics::read::<T>(rest) {
+            Ok(read) => return (Some(read), errors),
             Err(error) => error,
         };
         let is_removed = remove(rest, error.key());
@@ -80,7 +103,7 @@ fn faults_within<P: Parameters>(rest: &mut Value) -> Vec<ParameterError> {
             errors.push(error);
         }
         if !is_removed {
-            return errors;
+            return (None, errors);
         }
     }
 }

@@ -88,7 +88,7 @@ impl PidGains {
             Some(Value::String(path)) => Self::load(files, Some(path.as_ref())),
             Some(table) => {
                 let whole = Self::over_file(files, table)?;
-                let gains = diagnostics::read(whole.as_ref().unwrap_or(table))
+                let gains = bus::parameters::read(whole.as_ref().unwrap_or(table))
                     .and_then(|gains: Self| gains.check().map(|()| gains));
                 gains.map_err(|error| error.within("gains"))
             }
@@ -121,17 +121,22 @@ impl PidGains {
     fn check(&self) -> Result<(), ParameterError> {
         let loops =
             [("altitude", self.altitude), ("roll", self.roll), ("pitch", self.pitch), ("yaw", self.yaw)];
-        for (name, of) in loops {
-            GAIN.check(&format!("{name}.proportional_1_s2"), of.proportional_1_s2)?;
-            GAIN.check(&format!("{name}.integral_1_s3"), of.integral_1_s3)?;
-            GAIN.check(&format!("{name}.derivative_1_s"), of.derivative_1_s)?;
-        }
-        GAIN.check("altitude_integral_climb_max_m_s", self.altitude_integral_climb_max_m_s)?;
-        GAIN.check("altitude_integral_max_m_s2", self.altitude_integral_max_m_s2)?;
-        GAIN.check("attitude_integral_max_rad_s2", self.attitude_integral_max_rad_s2)?;
+        let loops = loops.into_iter().flat_map(|(name, of)| {
+            [
+                GAIN.check(&format!("{name}.proportional_1_s2"), of.proportional_1_s2),
+                GAIN.check(&format!("{name}.integral_1_s3"), of.integral_1_s3),
+                GAIN.check(&format!("{name}.derivative_1_s"), of.derivative_1_s),
+            ]
+        });
         let tilt_rad = self.tilt_command_max_rad;
         let is_good = tilt_rad > 0.0 && tilt_rad < std::f64::consts::FRAC_PI_3;
-        require("tilt_command_max_rad", tilt_rad, is_good, "above 0 and below 1.0472 (60 deg)")
+        let limits = [
+            GAIN.check("altitude_integral_climb_max_m_s", self.altitude_integral_climb_max_m_s),
+            GAIN.check("altitude_integral_max_m_s2", self.altitude_integral_max_m_s2),
+            GAIN.check("attitude_integral_max_rad_s2", self.attitude_integral_max_rad_s2),
+            require("tilt_command_max_rad", tilt_rad, is_good, "above 0 and below 1.0472 (60 deg)"),
+        ];
+        ParameterError::gather(loops.chain(limits)).map(drop)
     }
 }
 

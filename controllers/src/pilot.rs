@@ -76,13 +76,22 @@ impl Component for Pilot {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let altitude_m = parameters.initial_altitude_m;
-        refuse(!ALTITUDES_M.contains(&altitude_m), "initial_altitude_m", || {
+        let altitude = refuse(!ALTITUDES_M.contains(&altitude_m), "initial_altitude_m", || {
             format!("`initial_altitude_m` is {altitude_m} m, expected {ALTITUDES_EXPECTED}")
-        })?;
+        });
         let initial = Values { altitude_m, ..Values::default() };
-        let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz())?;
+        let schedule = Schedule::new(&parameters.set_points, &initial, context.rate_hz());
+        let from_s = parameters.from_s;
+        let start = refuse(from_s != 0.0 && parameters.data.is_none(), "from_s", || {
+            format!(
+                "`from_s` is {from_s} s, in no recording: it moves the sticks in `data`, not the schedule"
+            )
+        });
         let load = |path| Sticks::load(&context.files, path);
-        let sticks = parameters.data.as_deref().map(load).transpose()?;
+        let sticks = parameters.data.as_deref().map(load).transpose();
+        let numbers = ParameterError::gather([altitude, start]);
+        let read = ParameterError::both(schedule, sticks);
+        let (_, (schedule, sticks)) = ParameterError::both(numbers, read)?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
         if let Some(SetPointEntry { channel, .. }) = parameters.set_points.iter().find(taken) {
             let message = format!(
@@ -90,12 +99,6 @@ impl Component for Pilot {
             );
             return Err(ParameterError::conflict("set_points", message));
         }
-        let from_s = parameters.from_s;
-        refuse(from_s != 0.0 && sticks.is_none(), "from_s", || {
-            format!(
-                "`from_s` is {from_s} s, in no recording: it moves the sticks in `data`, not the schedule"
-            )
-        })?;
         warn_of_late(&parameters.set_points, context);
         Ok(Self { schedule, sticks, from_s })
     }

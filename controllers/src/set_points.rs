@@ -151,18 +151,19 @@ impl Schedule {
     /// The schedule that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
     ///
     /// # Errors
-    /// An entry has an unknown kind, channel or unit, a key that its kind lacks or does not know, or a
-    /// time that is negative or not finite.
+    /// Entries that have an unknown kind, channel or unit, a key that their kind lacks or does not know, or a
+    /// time that is negative or not finite; all of these faults.
     pub fn new(
         entries: &[SetPointEntry],
         initial: &SetPoint,
         tick_rate_hz: u32,
     ) -> Result<Self, ParameterError> {
         let mut schedule = Self::holding(initial);
-        for (index, entry) in entries.iter().enumerate() {
+        let read = entries.iter().enumerate().map(|(index, entry)| {
             let read = Reader { entry, tick_rate_hz }.add_to(&mut schedule.channels);
-            read.map_err(|error| error.within(&format!("set_points.{index}")))?;
-        }
+            read.map_err(|error| error.within(&format!("set_points.{index}")))
+        });
+        ParameterError::gather(read)?;
         schedule.channels.iter_mut().for_each(ChannelPlan::link);
         Ok(schedule)
     }
@@ -229,48 +230,63 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn add_to(&self, channels: &mut [ChannelPlan; 4]) -> Result<(), ParameterError> {
-        let SetPointEntry { kind, channel: name, unit, to, over_s, amplitude, duration_s, .. } = self.entry;
-        let found = CHANNELS.iter().zip(channels).find(|(channel, _)| channel.name == name);
-        let (channel, plan) = found.ok_or_else(|| {
-            let expected = "\"altitude\", \"roll\", \"pitch\" or \"yaw\"";
-            ParameterError::value("channel", expected, format_args!("\"{name}\""))
-        })?;
-        let si_per_unit = channel.units.factor(unit).ok_or_else(|| {
-            let expected = format!("{} on channel {name}", channel.units.names(" or "));
-            ParameterError::value("unit", expected, format_args!("\"{unit}\""))
-        })?;
+        let SetPointEntry { kind, to, over_s, amplitude, duration_s, .. } = self.entry;
+        let channel = self.channel();
+        let known = channel.as_ref().ok().copied();
+        let start = ParameterError::both(channel, self.start_tick());
         match kind.as_str() {
             "step" | "ramp" => {
                 let is_ramp = kind == "ramp";
-                self.require_only(if is_ramp { &["to", "over_s"] } else { &["to"] })?;
-                let to = self.value("to", *to, channel, si_per_unit)?;
-                let length_ticks = if is_ramp { self.length_ticks("over_s", *over_s)? } else { 0 };
-                plan.legs.push(Leg { start_tick: self.start_tick()?, length_ticks, from: to, to });
+                let only = self.require_only(if is_ramp { &["to", "over_s"] } else { &["to"] });
+                let length = if is_ramp { self.length_ticks("over_s", *over_s) } else { Ok(0) };
+                let sizes = ParameterError::both(self.value("to", *to, known), length);
+                let (start, (sizes, ())) = ParameterError::both(start, ParameterError::both(sizes, only))?;
+                let (((place, _), start_tick), (to, length_ticks)) = (start, sizes);
+                channels[place].legs.push(Leg { start_tick, length_ticks, from: to, to });
             }
             "doublet" => {
-                self.require_only(&["amplitude", "duration_s"])?;
-                let amplitude = self.value("amplitude", *amplitude, channel, si_per_unit)?;
-                let pulse_ticks = self.length_ticks("duration_s", *duration_s)?;
-                plan.doublets.push(Doublet { start_tick: self.start_tick()?, pulse_ticks, amplitude });
+                let only = self.require_only(&["amplitude", "duration_s"]);
+                let length = self.length_ticks("duration_s", *duration_s);
+                let sizes = ParameterError::both(self.value("amplitude", *amplitude, known), length);
+                let (start, (sizes, ())) = ParameterError::both(start, ParameterError::both(sizes, only))?;
+                let (((place, _), start_tick), (amplitude, pulse_ticks)) = (start, sizes);
+                channels[place].doublets.push(Doublet { start_tick, pulse_ticks, amplitude });
             }
             other => {
                 let expected = "\"step\", \"ramp\" or \"doublet\"";
-                return Err(ParameterError::value("kind", expected, format_args!("\"{other}\"")));
+                let error = ParameterError::value("kind", expected, format_args!("\"{other}\""));
+                return ParameterError::both(start, Err::<(), _>(error)).map(drop);
             }
         }
         Ok(())
     }
 
-    /// A value of the channel in SI, within its range.
+    /// The place of the entry's channel in [`CHANNELS`], and the factor from the entry's unit to SI.
+    fn channel(&self) -> Result<(usize, f64), ParameterError> {
+        let SetPointEntry { channel: name, unit, .. } = self.entry;
+        let place = CHANNELS.iter().position(|channel| channel.name == name);
+        let place = place.ok_or_else(|| {
+            let expected = "\"altitude\", \"roll\", \"pitch\" or \"yaw\"";
+            ParameterError::value("channel", expected, format_args!("\"{name}\""))
+        })?;
+        let units = &CHANNELS[place].units;
+        let si_per_unit = units.factor(unit).ok_or_else(|| {
+            let expected = format!("{} on channel {name}", units.names(" or "));
+            ParameterError::value("unit", expected, format_args!("\"{unit}\""))
+        })?;
+        Ok((place, si_per_unit))
+    }
+
+    /// A value of the channel in SI, within its range; not compared with that if the channel is not `known`.
     fn value(
         &self,
         key: &'static str,
         value: Option<f64>,
-        channel: &Channel,
-        si_per_unit: f64,
+        known: Option<(usize, f64)>,
     ) -> Result<f64, ParameterError> {
         let value = self.number(key, value)?;
-        let si = si_per_unit * value;
+        let Some((place, si_per_unit)) = known else { return Ok(value) };
+        let (channel, si) = (&CHANNELS[place], si_per_unit * value);
         let found = format_args!("{value} {}", self.entry.unit);
         require(key, found, channel.range.contains(&si), channel.expected).map(|()| si)
     }
@@ -301,11 +317,12 @@ impl Reader<'_> {
     fn require_only(&self, keys: &[&str]) -> Result<(), ParameterError> {
         let SetPointEntry { kind, to, over_s, amplitude, duration_s, .. } = self.entry;
         let given = [("to", to), ("over_s", over_s), ("amplitude", amplitude), ("duration_s", duration_s)];
-        let mut others = given.into_iter().filter(|(key, _)| !keys.contains(key));
-        match others.find_map(|(key, value)| Some((key, (*value)?))) {
-            Some((key, number)) => Err(ParameterError::value(key, format!("left out of a {kind}"), number)),
-            None => Ok(()),
-        }
+        let others = given.into_iter().filter(|(key, _)| !keys.contains(key));
+        let checked = others.filter_map(|(key, value)| {
+            let number = (*value)?;
+            Some(Err::<(), _>(ParameterError::value(key, format!("left out of a {kind}"), number)))
+        });
+        ParameterError::gather(checked).map(drop)
     }
 }
 
@@ -361,6 +378,18 @@ mod tests {
         let pitch_rad = |tick| schedule.at(tick).pitch_rad;
         assert_eq!((pitch_rad(6), pitch_rad(7), pitch_rad(56)), (0.0, 0.1, 0.1));
         assert_eq!((pitch_rad(57), pitch_rad(58), pitch_rad(59)), (0.1 - 0.2, 0.1 + 0.2, 0.1));
+    }
+
+    #[test]
+    fn all_errors_of_all_entries_are_told() {
+        let entries = r#"{kind="step", channel="roll", at_s=-1.0, to=1.0, unit="m"},
+                         {kind="doublet", channel="altitude", at_s=0.0, amplitude=1e9, unit="m", duration_s=0.0},
+                         {kind="jump", channel="rol", at_s=0.0, unit="deg"}"#;
+        let errors = schedule(entries).unwrap_err().into_each();
+        let mut keys: Vec<&str> = errors.iter().map(ParameterError::key).collect();
+        keys.sort_unstable();
+        let expected = ["0.at_s", "0.unit", "1.amplitude", "1.duration_s", "2.channel", "2.kind"];
+        assert_eq!(keys, expected.map(|key| format!("set_points.{key}")));
     }
 
     #[test]

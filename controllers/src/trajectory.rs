@@ -115,16 +115,23 @@ impl Trajectory {
     /// An entry of unknown kind, one that lacks a key or has an unknown one, a number out of its range: in words.
     pub fn read(entries: &[serde_json::Value], start: Start) -> Result<Self, ParameterError> {
         let mut trajectory = Self { segments: Vec::with_capacity(entries.len()), end: start };
+        let mut errors = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
-            let appended = diagnostics::read(entry).and_then(|entry| trajectory.append(&entry));
-            appended.map_err(|error| error.within(&format!("segments.{index}")))?;
+            let appended = bus::parameters::read(entry).and_then(|entry| trajectory.append(&entry));
+            let each = appended.err().map_or(Vec::new(), ParameterError::into_each);
+            // Behind a faulty segment, nobody knows where a path begins.
+            let is_of_path = |error: &ParameterError| ["waypoints_m", "times_s"].contains(&error.key());
+            let has_faults = !errors.is_empty();
+            let each = each.into_iter().filter(|error| !has_faults || !is_of_path(error));
+            errors.extend(each.map(|error| Err::<(), _>(error.within(&format!("segments.{index}")))));
         }
-        Ok(trajectory)
+        ParameterError::gather(errors).map(|_| trajectory)
     }
 
     fn append(&mut self, entry: &SegmentEntry) -> Result<(), ParameterError> {
-        let (way, duration_s) = entry.way(self.end.position_W_m)?;
-        let yaw_end_rad = entry.yaw_end_rad(self.end.yaw_rad)?;
+        let way = entry.way(self.end.position_W_m);
+        let yaw_end_rad = entry.yaw_end_rad(self.end.yaw_rad);
+        let ((way, duration_s), yaw_end_rad) = ParameterError::both(way, yaw_end_rad)?;
         let (start_s, yaw_start_rad) = (self.duration_s(), self.end.yaw_rad);
         self.end = Start { position_W_m: way.end(duration_s), yaw_rad: yaw_end_rad };
         self.segments.push(Segment { start_s, duration_s, way, yaw_start_rad, yaw_end_rad });
@@ -262,14 +269,16 @@ impl SegmentEntry {
                 Ok((Way::Rest(from_W_m), duration_s))
             }
             Self::Circle { radius_m, speed_m_s, laps, ramp_s, direction_deg, .. } => {
-                require("radius_m", radius_m, radius_m != 0.0, "a number other than 0")?;
-                finite("radius_m", radius_m)?;
-                Laps { speed_m_s, laps, ramp_s, direction_deg }.of(Shape::Circle { radius_m }, from_W_m)
+                let radius = require("radius_m", radius_m, radius_m != 0.0, "a number other than 0")
+                    .and_then(|()| finite("radius_m", radius_m));
+                let laps = Laps { speed_m_s, laps, ramp_s, direction_deg };
+                ParameterError::both(radius, laps.check())?;
+                laps.of(Shape::Circle { radius_m }, from_W_m)
             }
             Self::FigureEight { half_length_m, speed_m_s, laps, ramp_s, direction_deg, .. } => {
-                positive("half_length_m", half_length_m)?;
-                let shape = Shape::FigureEight { half_length_m };
-                Laps { speed_m_s, laps, ramp_s, direction_deg }.of(shape, from_W_m)
+                let laps = Laps { speed_m_s, laps, ramp_s, direction_deg };
+                ParameterError::both(positive("half_length_m", half_length_m), laps.check())?;
+                laps.of(Shape::FigureEight { half_length_m }, from_W_m)
             }
             Self::MinimumSnap { ref waypoints_m, ref times_s, mean_speed_m_s, .. } => {
                 let waypoints_W_m = waypoints(from_W_m, waypoints_m)?;
@@ -304,10 +313,17 @@ struct Laps {
 }
 
 impl Laps {
+    fn check(&self) -> Result<(), ParameterError> {
+        let checks = [
+            positive("speed_m_s", self.speed_m_s),
+            positive("ramp_s", self.ramp_s),
+            finite("direction_deg", self.direction_deg),
+        ];
+        ParameterError::gather(checks).map(drop)
+    }
+
+    /// The way along `shape`; the keys have passed their check.
     fn of(&self, shape: Shape, start_W_m: Vector3<f64>) -> Result<(Way, f64), ParameterError> {
-        positive("speed_m_s", self.speed_m_s)?;
-        positive("ramp_s", self.ramp_s)?;
-        finite("direction_deg", self.direction_deg)?;
         let (rate_rad_s, ramp_s) = (self.speed_m_s / shape.speed_max_m_rad(), self.ramp_s);
         let direction_rad = self.direction_deg.to_radians();
         let phase_rad = TAU * f64::from(self.laps);

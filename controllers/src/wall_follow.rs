@@ -223,7 +223,8 @@ impl Law for WallFollowLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = WallFollowGains::load(&context.node.files, parameters.gains.as_deref())?;
+        let gains = WallFollowGains::load(&context.node.files, parameters.gains.as_deref());
+        let (gains, shared) = ParameterError::both(gains, parameters.shared())?;
         let nominal_m_s =
             if parameters.mode == Mode::Varying { VARYING_SPEED_M_S } else { CONSTANT_SPEED_M_S };
         Ok(Self {
@@ -235,7 +236,7 @@ impl Law for WallFollowLaw {
             altitude_m: parameters.altitude_m,
             heading_rad: parameters.heading_rad,
             start_state: parameters.start_state,
-            shared: parameters.shared()?,
+            shared,
         })
     }
 

@@ -178,11 +178,12 @@ impl Law for WallFollowThesisLaw {
     }
 
     fn new(parameters: &Self::Parameters, context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let gains = WallFollowThesisGains::load(&context.node.files, parameters.gains.as_deref())?;
+        let gains = WallFollowThesisGains::load(&context.node.files, parameters.gains.as_deref());
+        let (gains, ahead) = ParameterError::both(gains, parameters.ahead())?;
         Ok(Self {
             velocity: VelocityLoop::new(&gains.loops, context.craft.hover_model(), context.node.period_s()),
             gains,
-            ahead: parameters.ahead()?,
+            ahead,
             distance_m: parameters.distance_m,
             altitude_m: parameters.altitude_m,
             heading_rad: parameters.heading_rad,

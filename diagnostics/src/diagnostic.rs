@@ -156,6 +156,8 @@ impl Diagnostic {
     fn each_once(self) -> Self {
         let mut faults: Vec<Self> = self.all().collect();
         join_misspelt(&mut faults);
+        // A file is told where it is named first.
+        in_order_of_lines(&mut faults);
         let mut once: Vec<Self> = Vec::with_capacity(faults.len());
         for mut fault in faults {
             let is_told = once.iter_mut().any(|told| told.takes_over(&mut fault));

@@ -164,22 +164,20 @@ impl Component for PropellerStand {
         let sigmas = [force_noise_N, torque_noise_N_m, speed_noise_rad_s];
         let noise = Noise { sigmas, random: stream(run.seed, run.name) };
         let vehicle = Vehicle::load_from(&run.files, &vehicle);
-        let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
-        let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
-        require(
-            "rotor",
-            rotor,
-            is_there,
-            format!("1 to {}, in the order of the vehicle file", vehicle.rotors.len()),
-        )?;
+        let vehicle = vehicle.map_err(|error| error.named_by("vehicle"));
         let ticks = run.period_ticks;
-        refuse(ticks != 1, "period_ticks", || {
+        let period = refuse(ticks != 1, "period_ticks", || {
             format!("`period_ticks` is {ticks}, expected 1: a stand runs at every tick; leave it out")
-        })?;
+        });
+        let (vehicle, ()) = ParameterError::both(vehicle, period)?;
+        let is_there = (1..=vehicle.rotors.len()).contains(&rotor);
+        let expected = format!("1 to {}, in the order of the vehicle file", vehicle.rotors.len());
+        let number = require("rotor", rotor, is_there, expected);
         let dt_s = run.tick_s();
         airworthy::tell_unsourced(&vehicle, run);
-        airworthy::check_steps(&vehicle, dt_s, run)?;
-        let profile = profile(&speeds, &vehicle.command, dt_s)?;
+        let steps = airworthy::check_steps(&vehicle, dt_s, run);
+        let profile = profile(&speeds, &vehicle.command, dt_s);
+        let (_, profile) = ParameterError::both(ParameterError::gather([number, steps]), profile)?;
         Ok(Self { vehicle, rotor: rotor - 1, profile, dt_s, noise })
     }
 

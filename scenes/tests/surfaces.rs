@@ -41,3 +41,46 @@ fn what_no_surface_has_is_refused_with_its_key() {
     let error = scene("friction = 0.5\n", "").unwrap_err().to_string();
     assert!(error.contains("friction"), "a number without unit and source: {error}");
 }
+
+#[test]
+fn all_faults_of_all_things_are_told() {
+    let number = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+    };
+    let (point, size) = (number("[1, 0]", "m"), number("[0, 1, 1]", "kg"));
+    let (rate, mass) = (number("2", "1"), number("-1", "kg"));
+    let lines: [&str; 7] = [
+        "name = \"\"",
+        "friction = 1",
+        &format!("restitution = {rate}"),
+        &format!("[[boxes]]\nname = 3\ncentre = {point}\nsize = {size}\nmass = {mass}"),
+        "[[balls]]\nname = \"a\"\npaint = 1",
+        "[[meshes]]\nname = \"b\"\nfile = \"none.obj\"\nsolid = \"yes\"",
+        "[rig]\nheave = 1\nsway = 2",
+    ];
+    let error = Scene::parse(&lines.join("\n"), "test.toml").unwrap_err();
+    let keys: Vec<String> = error.all().map(|fault| fault.key().to_owned()).collect();
+    for key in [
+        "name",
+        "friction",
+        "restitution",
+        "boxes.0.name",
+        "boxes.0.centre.value",
+        "boxes.0.size.unit",
+        "boxes.0.mass",
+        "balls.0.centre",
+        "balls.0.radius",
+        "balls.0.paint",
+        "meshes.0.file",
+        "meshes.0.position",
+        "meshes.0.scale",
+        "meshes.0.solid",
+        "rig.bearing",
+        "rig.heave",
+        "rig.sway",
+    ] {
+        assert_eq!(keys.iter().filter(|told| *told == key).count(), 1, "{key} in {keys:?}");
+    }
+    let lines: Vec<usize> = error.all().filter_map(|fault| Some(fault.place?.line)).collect();
+    assert!(lines.is_sorted(), "{error}");
+}

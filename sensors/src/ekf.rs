@@ -15,7 +15,7 @@ use bus::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
 use bus::{InputPorts, OutputPorts};
-use diagnostics::ParameterError;
+use diagnostics::parameter::{ParameterError, refuse};
 use filter::{Ekf, EkfState};
 use history::{Measurement, Reading, Source};
 use params::EkfParams;
@@ -74,12 +74,13 @@ impl Component for Ekf {
     type State = EkfState;
 
     fn new(params: EkfParams, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let filter = Self::with_period(params, context.period_s())?;
+        let filter = Self::with_period(params, context.period_s());
         let remembered_s = Some(params.delay_max_ms * 1e-3);
         context.state_times(SampleTimes { remembered_s, ..SampleTimes::default() });
         let has_position = context.has("gps") || context.has("mocap");
         let unwired = "nothing tells the position: wire `inputs.gps`, `inputs.mocap` or both";
-        if has_position { Ok(filter) } else { Err(ParameterError::conflict("", unwired)) }
+        let position = refuse(!has_position, "", || unwired);
+        ParameterError::both(filter, position).map(|(filter, ())| filter)
     }
 
     fn initial(&self) -> EkfState {

@@ -285,21 +285,23 @@ impl Component for Link {
     type State = LinkMemory;
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        refuse(context.period_ticks != 1, "", || {
+        let period = refuse(context.period_ticks != 1, "", || {
             let ticks = context.period_ticks;
             format!(
                 "it computes every {ticks} ticks, and would miss messages between: leave `period_ticks` out"
             )
-        })?;
+        });
         let mut names = context.inputs.to_vec();
         names.sort_unstable();
         let (count, most) = (names.len(), STREAMS);
-        refuse(count > most, "", || format!("it has {count} inputs, expected at most {most}"))?;
-        if let Some(unknown) = parameters.streams.keys().find(|name| !names.contains(&name.as_str())) {
-            return Err(ParameterError::unknown(format!("streams.{unknown}"), names));
-        }
+        let inputs = refuse(count > most, "", || format!("it has {count} inputs, expected at most {most}"));
+        let unknown = parameters.streams.keys().filter(|name| !names.contains(&name.as_str()));
+        let unknown = unknown.map(|name| {
+            Err::<(), _>(ParameterError::unknown(format!("streams.{name}"), names.iter().copied()))
+        });
+        let checked = ParameterError::gather([period, inputs].into_iter().chain(unknown));
         let streams = names.iter().map(|name| LinkStream::new(name, &parameters, context));
-        let streams = streams.collect::<Result<Vec<_>, _>>()?;
+        let (_, streams) = ParameterError::both(checked, ParameterError::gather(streams))?;
         parameters.check_load(context)?;
         let delay_s = parameters.latency_ms * 1e-3;
         context.state_times(SampleTimes { delay_s, ..SampleTimes::default() });
@@ -401,14 +403,14 @@ impl LinkStream {
     fn new(name: &str, parameters: &Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let parameters = parameters.streams.get(name).cloned().unwrap_or_default();
         let key = |of: &str| format!("streams.{name}.{of}");
-        if let Some(bytes) = parameters.bytes {
-            require(&key("bytes"), bytes, (1..=65_535).contains(&bytes), "from 1 to 65535")?;
-        }
-        if let Some(rate_hz) = parameters.rate_hz {
+        let bytes = parameters.bytes.map_or(Ok(()), |bytes| {
+            require(&key("bytes"), bytes, (1..=65_535).contains(&bytes), "from 1 to 65535")
+        });
+        let rate = parameters.rate_hz.map_or(Ok(()), |rate_hz| {
             let most = context.period_s().recip();
-            positive_up_to(&key("rate_hz"), rate_hz, most, "Hz, the rate of the link's own steps")?;
-        }
-        Ok(Self { parameters })
+            positive_up_to(&key("rate_hz"), rate_hz, most, "Hz, the rate of the link's own steps")
+        });
+        ParameterError::both(bytes, rate).map(|_| Self { parameters })
     }
 
     /// Bytes of a message on the wire.

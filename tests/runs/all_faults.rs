@@ -130,7 +130,75 @@ fn nothing_is_told_of_what_a_faulty_process_sends() {
 fn all_faults_of_a_table_of_parameters_are_told() {
     let mocap = |parameters: &str| with(&[("period_ticks = 5", &format!("parameters = {{ {parameters} }}"))]);
     told(&mocap("rate = 3, delay = 4"), &["unknown key `rate`", "unknown key `delay`"]);
-    // A kind's own checks tell the first fault.
-    told(&mocap("delay_ms = -1, dropout = 2"), &["`delay_ms`"]);
+    told(&mocap("delay_ms = -1, dropout = 2"), &["`delay_ms`", "`dropout`"]);
     told(&mocap("rate_hz = \"x\", delay = 4"), &["`rate_hz`", "unknown key `delay`"]);
+    let late = "rate_hz = 10.0, delay_ms = 1e7, dropout = 0.9, dropout_mean_s = 0.5";
+    told(&mocap(late), &["`delay_ms`", "`dropout_mean_s`"]);
+}
+
+/// Parameters that do not go together, each pair of them.
+#[test]
+fn all_contradictions_of_a_process_are_told() {
+    let plant = "kind = \"plant\"\nparameters = { crash_speed_m_s = 3.0, window_s = 0.00015 }";
+    told(
+        &with(&[("kind = \"plant\"", plant)]),
+        &["`crash_speed_m_s` needs `backend`", "needs the input `measured`", "not a whole number of ticks"],
+    );
+}
+
+#[test]
+fn all_faults_of_all_entries_of_a_list_are_told() {
+    let text = with(&[("at_s = 0.1, to = 1.5, unit = \"m\"", "at_s = -0.1, to = 1.5, unit = \"s\"")]);
+    told(&text, &["`set_points.0.at_s`", "`set_points.0.unit`"]);
+}
+
+/// A vehicle file, a gains file and a scene file with three faults each: each fault once, although two processes read the vehicle.
+#[test]
+fn all_faults_of_all_files_are_told() {
+    let place = Place::new();
+    let faulty = |name: &str, path: &str, changes: [(&str, &str); 3]| {
+        let text = fs::read_to_string(repository(path)).unwrap();
+        let change = |text: String, (from, to): (&str, &str)| {
+            assert!(text.contains(from), "{path} has {from}");
+            text.replacen(from, to, 1)
+        };
+        place.write(name, changes.into_iter().fold(text, change))
+    };
+    let vehicle = faulty(
+        "vehicle.toml",
+        "vehicles/hummingbird.toml",
+        [
+            ("value = 0.480, unit = \"kg\"", "value = \"x\", unit = \"m\""),
+            ("value = \"clockwise\"", "value = \"left\""),
+            ("[-0.17, 0, 0]", "[-1700, 0, 0]"),
+        ],
+    );
+    let gains = faulty(
+        "gains.toml",
+        "controllers/gains/pid.toml",
+        [("value = 12,", "value = -12,"), ("value = 3,", "valu = 3,"), ("\"rad/s^2\"", "\"rad\"")],
+    );
+    let scene = faulty(
+        "scene.toml",
+        "scenes/room.toml",
+        [("value = 0.5,", "value = -0.5,"), ("\"wall +y\"", "\"\""), ("[0, 5.05, 1.5]", "[0, 5.05]")],
+    );
+    let plant = format!("kind = \"plant\"\nscene = \"{scene}\"\nparameters.colour = 1");
+    let pid = format!("kind = \"pid\"\ngains = \"{gains}\"");
+    let text = with(&[("kind = \"plant\"", &plant), ("kind = \"pid\"", &pid)]);
+    let text = text.replace(&repository("vehicles/hummingbird.toml"), &vehicle);
+    let parts = [
+        "`friction`",
+        "`boxes.2.name`",
+        "`boxes.2.centre.value`",
+        "unknown key `colour`",
+        "`body.mass.value`",
+        "`body.mass.unit`",
+        "`rotors.0.spin.value`",
+        "`rotors.2.position`",
+        "`altitude.proportional`",
+        "unknown key `altitude.integral.valu`",
+        "`attitude.integral_max.unit`",
+    ];
+    told(&text, &parts);
 }

@@ -270,16 +270,16 @@ fn a_fault_of_a_file_that_two_processes_read_is_told_once_with_both() {
     ended.says(&[
         "unknown key `moter`",
         "did you mean `motor`?",
-        "by process `controller`, and in",
-        "by process `plant`",
+        "by process `plant`, and in",
+        "by process `controller`",
     ]);
     assert_eq!(ended.error.matches("moter`").count(), 1, "{ended}");
     assert!(!ended.error.contains("missing key"), "{ended}");
     let found = place.call(&["run", &manifest, "--json"]).with_code(2).json();
     assert_eq!(found["faults"].as_array().unwrap().len(), 1, "{found}");
     let fault = &found["faults"][0];
-    assert_eq!(fault["named_in"]["component"], "process `controller`", "{fault}");
-    assert_eq!(fault["also_named_in"][0]["component"], "process `plant`", "{fault}");
+    assert_eq!(fault["named_in"]["component"], "process `plant`", "{fault}");
+    assert_eq!(fault["also_named_in"][0]["component"], "process `controller`", "{fault}");
 }
 
 #[test]

@@ -467,6 +467,43 @@ fn several_faults_are_told_at_once_each_with_its_place() {
 }
 
 #[test]
+fn all_faults_of_a_number_a_rotor_and_an_effect_are_told() {
+    let keys = |changes: &[(&str, &str)]| {
+        let change = |text: String, (from, to): &(&str, &str)| {
+            assert!(text.contains(from), "the file has {from}");
+            text.replacen(from, to, 1)
+        };
+        let text = changes.iter().fold(HUMMINGBIRD.to_owned(), change);
+        let error = Vehicle::parse(&text, "bird.toml").unwrap_err();
+        error.all().map(|fault| fault.key().to_owned()).collect::<Vec<_>>()
+    };
+    let mass = MASS_LINE.replacen("0.480, unit = \"kg\"", "\"x\", unit = \"m\"", 1);
+    let mass = mass.replacen("source", "colour = 1, source", 1);
+    assert_eq!(keys(&[(MASS_LINE, &mass)]), ["body.mass.value", "body.mass.unit", "body.mass.colour"]);
+    let rotor = [("[0.17, 0, 0]", "[0.17, 0]"), ("value = \"clockwise\", source", "value = \"left\", sorce")];
+    let of_rotor = ["rotors.0.position.value", "rotors.0.spin.value", "rotors.0.spin.sorce"];
+    assert_eq!(keys(&rotor), of_rotor);
+    let moments = [("inertia_xx = { value = 5.6e-3", "inertia_xx = { value = -1"), ("8.1e-3", "0")];
+    assert_eq!(keys(&moments), ["body.inertia_xx", "body.inertia_zz"]);
+    assert_eq!(
+        keys(&[("value = 200", "value = 1"), ("value = 8600", "value = 1000")]),
+        ["command.max", "command.speed_at_max"]
+    );
+    let effect = "[[effects]]\nname = 3\nx = 1\n[envelope]\nspeed_max = 1\ntilt_max = 2\n\n[[rotors]]";
+    let of_effect = ["effects.0.name", "effects.0.x", "envelope.speed_max", "envelope.tilt_max"];
+    assert_eq!(keys(&[("[[rotors]]", effect)]), of_effect);
+}
+
+#[test]
+fn the_faults_of_a_base_and_of_the_file_on_it_are_told() {
+    let base = HUMMINGBIRD.replacen("value = 0.480", "value = -1", 1);
+    let text = "name = \"mine\"\nbase = \"bird.toml\"\n[command]\nmax = \"x\"\n";
+    let error = Vehicle::parse_with(text, "mine.toml", &|_| Ok(base.clone())).unwrap_err();
+    let told: Vec<String> = error.all().map(|fault| format!("{} {}", fault.file, fault.key())).collect();
+    assert_eq!(told, ["bird.toml body.mass", "mine.toml command.max"]);
+}
+
+#[test]
 fn robot_descriptions_are_named_and_the_page_of_keys_has_every_key() {
     let urdf = "<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot name=\"q\"><link name=\"base\"/></robot>";
     let cases = [
