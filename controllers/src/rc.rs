@@ -109,10 +109,11 @@ impl Component for Rc {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { channels, mut script, data, from_s } = parameters;
-        refuse(!from_s.is_finite() || from_s != 0.0 && data.is_none(), "from_s", || {
+        let start = refuse(!from_s.is_finite() || from_s != 0.0 && data.is_none(), "from_s", || {
             format!("`from_s` is {from_s} s, expected a time of the recording in `data`")
-        })?;
-        let recording = data.map(|path| Recording::load(&context.files, &path)).transpose()?;
+        });
+        let recording = data.map(|path| Recording::load(&context.files, &path)).transpose();
+        let (recording, ()) = ParameterError::both(recording, start)?;
         if let Some(recording) = &recording {
             recording.check_times(from_s, context)?;
         }

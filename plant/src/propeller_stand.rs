@@ -243,26 +243,33 @@ impl PropellerStand {
 /// The changes of speed in ticks of `dt_s`, in their order.
 fn profile(entries: &[SpeedEntry], map: &CommandMap, dt_s: f64) -> Result<Vec<Leg>, ParameterError> {
     refuse(entries.is_empty(), "speeds", || "`speeds` is empty: the rotor would never turn")?;
+    let mut errors = Vec::new();
     let mut legs: Vec<Leg> = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
-        let leg = leg(entry, map, dt_s).map_err(|error| error.within(&format!("speeds.{index}")))?;
+        let leg = match leg(entry, map, dt_s) {
+            Ok(leg) => leg,
+            Err(error) => {
+                errors.push(Err(error.within(&format!("speeds.{index}"))));
+                continue;
+            }
+        };
         let is_behind = legs.last().is_none_or(|last| last.start_tick + last.span_ticks <= leg.start_tick);
-        require(&format!("speeds.{index}.at_s"), entry.at_s, is_behind, "when the change before is over")?;
+        let key = format!("speeds.{index}.at_s");
+        errors.push(require(&key, entry.at_s, is_behind, "when the change before is over"));
         legs.push(leg);
     }
-    Ok(legs)
+    ParameterError::gather(errors).map(|_| legs)
 }
 
 fn leg(entry: &SpeedEntry, map: &CommandMap, dt_s: f64) -> Result<Leg, ParameterError> {
-    not_negative("at_s", entry.at_s)?;
-    not_negative("over_s", entry.over_s)?;
+    let times = ParameterError::both(not_negative("at_s", entry.at_s), not_negative("over_s", entry.over_s));
     let to_rad_s = entry.to_rpm * PI / 30.0;
     // A millionth more, so that the ends of the range can be asked for although they were converted.
     let [least, most] = [map.speed_at_min_rad_s * (1.0 - 1e-6), map.speed_at_max_rad_s * (1.0 + 1e-6)];
     let [low_rpm, high_rpm] = [map.speed_at_min_rad_s, map.speed_at_max_rad_s].map(|speed| speed * 30.0 / PI);
     let expected = format!("0, or {low_rpm:.0} to {high_rpm:.0} rpm, which the motors can be asked for");
     let can_be_asked = to_rad_s == 0.0 || (least..=most).contains(&to_rad_s);
-    require("to_rpm", entry.to_rpm, can_be_asked, expected)?;
+    ParameterError::both(times, require("to_rpm", entry.to_rpm, can_be_asked, expected))?;
     let ticks = |time_s: f64| (time_s / dt_s).round();
     Ok(Leg { start_tick: ticks(entry.at_s), span_ticks: ticks(entry.over_s), to_rad_s })
 }

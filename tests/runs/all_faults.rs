@@ -147,6 +147,18 @@ fn all_contradictions_of_a_process_are_told() {
 }
 
 #[test]
+fn a_number_out_of_all_range_hides_no_fault_of_a_file() {
+    let place = Place::new();
+    let hummingbird = repository("vehicles/hummingbird.toml");
+    let text = fs::read_to_string(&hummingbird).unwrap().replacen("value = 0.480", "value = -1", 1);
+    let vehicle = place.write("light.toml", text);
+    let plant =
+        "kind = \"plant\"\nparameters = { initial_position_m = [1e30, 0.0, 0.0], initial_yaw_deg = 1e30 }";
+    let text = with(&[("kind = \"plant\"", plant)]).replace(&hummingbird, &vehicle);
+    told(&text, &["`initial_position_m.0`", "`initial_yaw_deg`", "`body.mass`"]);
+}
+
+#[test]
 fn all_faults_of_all_entries_of_a_list_are_told() {
     let text = with(&[("at_s = 0.1, to = 1.5, unit = \"m\"", "at_s = -0.1, to = 1.5, unit = \"s\"")]);
     told(&text, &["`set_points.0.at_s`", "`set_points.0.unit`"]);

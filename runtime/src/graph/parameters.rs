@@ -211,7 +211,10 @@ fn check_component(
     };
     // No kind is made of a number that is out of all range.
     let errors = match ranges.is_ok().then(|| kind.check(parameters, context)) {
-        None => kind.faults(parameters),
+        None => {
+            let rest = ranges::without(parameters);
+            [kind.faults(parameters), kind.faults_of_files(&rest, &context.clone())].concat()
+        }
         Some(Ok(())) => Vec::new(),
         Some(Err(told)) => all_errors(kind, parameters, context, told, scope),
     };

@@ -47,36 +47,51 @@ const RANGES: [Range; 21] = [
 /// A smaller magnitude, other than 0, is an accident: its inverse or its square leaves the range of a double.
 const LEAST: f64 = 1e-30;
 
-/// Refuses the first number of the parameters and initial values of process `name` that is out of all range.
+/// Refuses numbers of the parameters and initial values of process `name` that are out of all range.
 ///
 /// # Errors
-/// Its key, the bound and why.
+/// Their keys, the bounds and why.
 pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
     let refused = |at: &Spanned<String>, reason: ParameterError| {
         let message = format!("process `{}`: {reason}", name.get_ref());
         manifest.problem(&at.span(), message, "correct the number or its unit: the key ends in the unit")
     };
-    let parameters = process.parameters.iter().map(|(key, value)| {
-        within(key.get_ref(), key.get_ref(), value).map_err(|reason| refused(key, reason))
-    });
+    let checked = |at, path: &str, key: &str, value| {
+        let reasons = within(path, key, value).err().map_or(Vec::new(), ParameterError::into_each);
+        reasons.into_iter().map(move |reason| Err::<(), _>(refused(at, reason)))
+    };
+    let parameters =
+        process.parameters.iter().flat_map(|(key, value)| checked(key, key.get_ref(), key.get_ref(), value));
     let initial = process.inputs.iter().filter_map(|(port, input)| Some((port, input.initial.as_ref()?)));
-    let initial = initial.map(|(port, initial)| {
-        let path = format!("inputs.{}.initial", port.get_ref());
-        within(&path, "", initial).map_err(|reason| refused(port, reason))
+    let initial = initial.flat_map(|(port, initial)| {
+        checked(port, &format!("inputs.{}.initial", port.get_ref()), "", initial)
     });
     Diagnostic::gather(parameters.chain(initial)).map(drop)
+}
+
+/// `parameters` without those that hold a number out of all range.
+pub fn without(parameters: &Value) -> Value {
+    let mut rest = parameters.clone();
+    if let Value::Object(table) = &mut rest {
+        table.retain(|key, value| within(key, key, value).is_ok());
+    }
+    rest
 }
 
 /// Checks `value` at the dotted `path`; `key` is the last key on it that is a name.
 fn within(path: &str, key: &str, value: &Value) -> Result<(), ParameterError> {
     match value {
         Value::Object(table) => {
-            table.iter().try_for_each(|(key, value)| within(&format!("{path}.{key}"), key, value))
+            let each = table.iter().map(|(key, value)| within(&format!("{path}.{key}"), key, value));
+            ParameterError::gather(each).map(drop)
         }
-        Value::Array(array) => array
-            .iter()
-            .enumerate()
-            .try_for_each(|(index, value)| within(&format!("{path}.{index}"), key, value)),
+        Value::Array(array) => {
+            let each = array.iter().enumerate();
+            let each = each.map(|(index, value)| within(&format!("{path}.{index}"), key, value));
+            // Of a list of numbers, the first counts.
+            let is_of_numbers = array.iter().all(Value::is_number);
+            if is_of_numbers { each.collect() } else { ParameterError::gather(each).map(drop) }
+        }
         Value::Number(number) => number.as_f64().map_or(Ok(()), |number| number_within(path, key, number)),
         Value::Null | Value::Bool(_) | Value::String(_) => Ok(()),
     }
@@ -100,7 +115,7 @@ fn number_within(path: &str, key: &str, number: f64) -> Result<(), ParameterErro
 
 #[cfg(test)]
 mod tests {
-    use super::{RANGES, within};
+    use super::{RANGES, within, without};
     use serde_json::json;
 
     #[test]
@@ -126,5 +141,9 @@ mod tests {
             "{error}"
         );
         assert_eq!(within("gains", "gains", &json!({ "file": "1e300", "on": true })), Ok(()));
+        let entries = json!([{ "at_s": 1e30, "to_m": [1e30, 1e30] }, { "at_s": 1e30 }]);
+        let errors = within("list", "list", &entries).unwrap_err().into_each();
+        assert_eq!(errors.len(), 3, "{errors:?}");
+        assert_eq!(without(&json!({ "a_s": 1e30, "b_s": 1.0 })), json!({ "b_s": 1.0 }));
     }
 }
