@@ -264,10 +264,12 @@ impl Parameters {
             ("altitude_m", self.altitude_m.is_some()),
             ("yaw_rad", self.yaw_rad.is_some()),
         ];
-        if let Some((key, _)) = given.into_iter().find(|(_, is_given)| has_reference && *is_given) {
-            let message = format!("`{key}` is given, and so is the input `reference`; leave one of them out");
-            return Err(ParameterError::conflict("reference", message));
-        }
+        let twice = given.into_iter().map(|(key, is_given)| {
+            refuse(has_reference && is_given, "reference", || {
+                format!("`{key}` is given, and so is the input `reference`; leave one of them out")
+            })
+        });
+        ParameterError::gather(twice)?;
         refuse(!has_reference && self.altitude_m.is_none(), "altitude_m", || {
             "missing key `altitude_m`: without the input `reference` a velocity controller needs `altitude_m` and \
              `velocity_m_s`"

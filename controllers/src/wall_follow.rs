@@ -187,9 +187,10 @@ impl Parameters {
             ("ahead_min_m", self.ahead_min_m.is_some()),
         ];
         let Some(size_m) = self.room_m else {
-            let without = |(key, _)| format!("`{key}` has a meaning only with `room_m`; add that");
-            let lonely = of_a_room.into_iter().find(|(_, is_given)| *is_given).map(without);
-            return lonely.map_or(Ok(None), |message| Err(ParameterError::conflict("room_m", message)));
+            let lonely = of_a_room.into_iter().map(|(key, is_given)| {
+                refuse(is_given, "room_m", || format!("`{key}` has a meaning only with `room_m`; add that"))
+            });
+            return ParameterError::gather(lonely).map(|_| None);
         };
         refuse(
             self.mode == Mode::Varying,

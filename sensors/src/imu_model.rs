@@ -104,7 +104,7 @@ pub struct ImuParams {
     #[parameter(default = 0.0, check = not_negative)]
     pub delay_ms: f64,
     /// Fraction of the readings that are lost: the one before is sent again.
-    #[parameter(default = 0.0, range = "0 to below 1")]
+    #[parameter(default = 0.0, range = "0 to below 1", check = crate::channel::fraction_lost)]
     pub dropout: f64,
     /// Mean duration of losses; 0: each is independent of the one before.
     #[parameter(default = 0.0, check = not_negative)]
