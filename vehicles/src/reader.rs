@@ -9,7 +9,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
-use diagnostics::parameter::{Bounds, all, not_negative, positive};
+use diagnostics::parameter::{Bounds, not_negative, positive};
 use diagnostics::unit::Dimension;
 use diagnostics::{Diagnostic, Faults, ParameterError, Place, nearest, parse_toml};
 
@@ -311,8 +311,12 @@ impl<'d, 't> Section<'d, 't> {
         let factor = faults.keep(parameter.meta(dimension, Origin::Known));
         let (value, numbers, factor) = faults.finish((|| Some((value?, numbers?, factor?)))())?;
         let numbers = numbers.map(|number| number * factor);
-        all(|key, si| bounds.check(key, si), &parameter.path, &numbers)
-            .map_err(|error| Diagnostic::at(parameter.doc.place(&value.span()), error))?;
+        let written = value.get_ref().as_array().into_iter().flat_map(|array| array.iter());
+        let checks = numbers.iter().zip(written).map(|(si, number)| {
+            let refused = |error: ParameterError| Diagnostic::at(parameter.doc.place(&number.span()), error);
+            bounds.check(&parameter.path, *si).map_err(refused)
+        });
+        Diagnostic::gather(checks)?;
         Ok(numbers)
     }
 

@@ -483,6 +483,7 @@ fn all_faults_of_a_number_a_rotor_and_an_effect_are_told() {
     let rotor = [("[0.17, 0, 0]", "[0.17, 0]"), ("value = \"clockwise\", source", "value = \"left\", sorce")];
     let of_rotor = ["rotors.0.position.value", "rotors.0.spin.value", "rotors.0.spin.sorce"];
     assert_eq!(keys(&rotor), of_rotor);
+    assert_eq!(keys(&[("[0.17, 0, 0]", "[1e9, 0, 1e9]")]), ["rotors.0.position"; 2]);
     let moments = [("inertia_xx = { value = 5.6e-3", "inertia_xx = { value = -1"), ("8.1e-3", "0")];
     assert_eq!(keys(&moments), ["body.inertia_xx", "body.inertia_zz"]);
     assert_eq!(
