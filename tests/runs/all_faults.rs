@@ -94,7 +94,7 @@ fn faults_of_every_stage_are_told_at_once() {
     ]);
     let text = text.replace(&hummingbird, &vehicle) + &pass("statistic = \"evry\"\nmax = 2.0");
     let parts =
-        ["unknown key `run.sed`", "no kind `mocup`", "/imu/imo", "mass", "`initial_altitude_m`", "`evry`"];
+        ["unknown key `run.sed`", "mass", "no kind `mocup`", "/imu/imo", "`initial_altitude_m`", "`evry`"];
     told(&text, &parts);
 }
 
