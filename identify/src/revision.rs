@@ -268,7 +268,8 @@ impl Found<'_, '_> {
     fn refined_without(&self, effect: &str, near: &[f64]) -> Foresight {
         let Self { problem, accepted, base } = self;
         let (_, fitted) = without_effects(problem, accepted, base, &[effect]);
-        refined_foresight(problem, &fitted, Some(near))
+        refined(problem, &fitted, Some(near))
+            .map_or_else(|| unrefined_foresight(problem, &fitted), |moved| moved.foresight(&[]))
     }
 
     /// One effect of `given_up` instead of two, of which `now` with both is worth no more.
@@ -280,8 +281,21 @@ impl Found<'_, '_> {
         near: Option<&[f64]>,
     ) -> Option<Revision> {
         let Self { problem, accepted, base } = self;
+        // Where nothing is predicted, the equations alone decide.
+        if now.worths(now).is_empty() {
+            return None;
+        }
         let is_as_good = |exchange: &Exchange| {
-            !now.is_worth_more_than(&refined_foresight(problem, &exchange.fitted, near))
+            let Exchange { new, fitted, .. } = exchange;
+            let moved = refined(problem, fitted, near);
+            let result = moved.as_ref().map_or(fitted, |moved| &moved.result);
+            let is_sound =
+                at_bound(problem, new, result).is_none() && joint_p_value(problem, result, new) < FALSE_RATE;
+            let predictions = || match &moved {
+                Some(moved) => moved.foresight(&[]),
+                None => unrefined_foresight(problem, fitted),
+            };
+            is_sound && !now.is_worth_more_than(&predictions())
         };
         let found = exchanges(problem, (accepted, base), given_up, kept).into_iter().find(is_as_good)?;
         let reason = format!(
@@ -381,12 +395,9 @@ impl Predictions {
     }
 }
 
-/// Predictions of a fit, refined from the values `near` on where that predicts better.
-fn refined_foresight(problem: &Problem, fitted: &FitResult, near: Option<&[f64]>) -> Foresight {
-    refined(problem, fitted, near).map_or_else(
-        || Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), fitted, &[]),
-        |moved| moved.foresight(&[]),
-    )
+/// Predictions of a fit that is not refined.
+fn unrefined_foresight(problem: &Problem, fitted: &FitResult) -> Foresight {
+    Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), fitted, &[])
 }
 
 /// The first of the `accepted` effects with a parameter that `fitted` left at a bound.

@@ -119,9 +119,12 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
         let fitted = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
         search.base = held_at_limits(problem, fitted);
         let StepwiseSearch { accepted, base, rounds } = &mut search;
-        let is_given_up = |one: &&Candidate| !one.is_in(accepted) && one.is_in(&open);
-        let taken = rounds.iter().filter_map(|round| Some(&round.taken()?.candidate));
-        let given_up: Vec<Candidate> = taken.filter(is_given_up).cloned().collect();
+        let mut given_up: Vec<Candidate> = Vec::new();
+        for Judged { candidate, .. } in rounds.iter().filter_map(Round::taken) {
+            if candidate.is_in(&open) && !candidate.is_in(accepted) && !candidate.is_in(&given_up) {
+                given_up.push(candidate.clone());
+            }
+        }
         match revisions.next(problem, (accepted, base), (&open, &given_up), progress) {
             Revision::Instead(exchange, old) => {
                 open.retain(|candidate| !exchange.old.contains(&candidate.kind.name));

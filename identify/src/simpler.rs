@@ -71,6 +71,10 @@ fn exchange(
     old: [&'static str; 2],
     kept: &[Candidate],
 ) -> Option<Exchange> {
+    // Of an effect with a candidate for each parameter the others would be closed with it.
+    if old.contains(&new.kind.name) {
+        return None;
+    }
     let is_old = |candidate: &Candidate| old.contains(&candidate.kind.name);
     let (dropped, mut others): (Vec<Candidate>, Vec<Candidate>) = accepted.iter().cloned().partition(is_old);
     let spared = free_parameters(&dropped);
