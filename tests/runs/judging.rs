@@ -53,7 +53,7 @@ fn a_run_without_a_recording_has_the_verdict_of_its_recording() {
         ("wall-stop-open", "20.0", composed),
         ("computing-time", "6.0", both),
     ];
-    // Every statistic, swaps, and steps that take time.
+    // Every statistic but `span`, swaps, and steps that take time.
     let is_quick = |name: &str| ["hover", "rig-a", "swap-laws", "computing-time"].contains(&name);
     for (manifest, seconds, ways) in cases("manifests", flights, |(name, ..)| is_quick(name)) {
         let duration = format!("run.duration_s={seconds}");
