@@ -16,16 +16,15 @@ use crate::priority::step_back;
 use anyhow::{Context as _, Result, anyhow};
 use bus::plan::Plan;
 use bus::watch::{WatchFiles, WatchReader};
-use channels::Channels;
+use channels::{Channels, lock};
 use foxglove::websocket::{
     Capability, ChannelView, Client, PlaybackControlRequest, PlaybackState, ServerListener, Status,
 };
 use foxglove::{Context, FoxgloveError, WebSocketServer, WebSocketServerHandle};
 use playback::Playback;
 use runtime::run_dir::{LiveRun, find_live};
-use std::collections::BTreeSet;
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 
@@ -110,7 +109,7 @@ impl Foxglove {
     pub fn follow(&self, run: LiveRun, plan: Plan, is_ended: &dyn Fn() -> bool) -> Result<()> {
         step_back();
         let files = WatchFiles::of(&run.entry.run_dir, &run.entry.run_id);
-        let mut samples = files.watch().context("cannot watch the run")?;
+        let samples = Arc::new(Mutex::new(files.watch().context("cannot watch the run")?));
         let (run_id, live) = (run.entry.run_id.clone(), Arc::new(Live::of(run, plan)));
         if self.shared.playback.steer(live.clone()) {
             // The run went back in time: clients forget what they know of it.
@@ -120,7 +119,7 @@ impl Foxglove {
         while !is_over {
             // Before the look: it then finds the last samples.
             is_over = is_ended() || !live.is_live();
-            match self.look(&files, &mut samples) {
+            match self.look(&files, &samples) {
                 // Its files have gone.
                 Err(_) if !live.is_live() => is_over = true,
                 looked => looked?,
@@ -142,33 +141,29 @@ impl Foxglove {
     }
 
     /// Sends the samples that have come.
-    fn look(&self, files: &WatchFiles, samples: &mut WatchReader) -> Result<()> {
-        let Shared { channels, playback } = &*self.shared;
+    fn look(&self, files: &WatchFiles, samples: &Arc<Mutex<WatchReader>>) -> Result<()> {
+        let channels = &self.shared.channels;
         if !channels.are_open() {
-            if !samples.is_attached() {
+            if !lock(samples).is_attached() {
                 return Ok(());
             }
             let topics = files.topics()?;
             self.on_worker(move |channels| channels.open(topics))??;
         }
-        let (mut newest_ns, mut unknown) = (None, BTreeSet::new());
-        samples.read(|sample| {
-            newest_ns = Some(sample.time_ns);
-            if !channels.send(sample) {
-                unknown.insert(sample.topic.to_owned());
-            }
-        });
+        let samples = samples.clone();
+        let (newest_ns, unknown) = self.on_worker(move |channels| channels.send_all(&mut lock(&samples)))?;
         for topic in unknown {
             self.on_worker(move |channels| channels.open_shadow(&topic))??;
         }
         if let Some(newest_ns) = newest_ns {
-            playback.reached(newest_ns);
+            self.shared.playback.reached(newest_ns);
         }
         Ok(())
     }
 
-    /// Does `work` on the thread that serves the clients. `foxglove` 0.30 sends the offer of a new channel before it takes
-    /// subscriptions to it: nothing is sent while that thread is busy.
+    /// Does `work` on the thread that serves the clients, because `foxglove` 0.30 takes a subscription in steps. It sends the
+    /// offer of a new channel before it takes subscriptions to it. A client gets samples before [`Shared`] is told of its
+    /// subscription, and would get the newest of them twice. Nothing happens between two steps while that thread is busy.
     fn on_worker<T: Send + 'static>(&self, work: impl FnOnce(&Channels) -> T + Send + 'static) -> Result<T> {
         let shared = self.shared.clone();
         let task = self.runtime.spawn(async move { work(&shared.channels) });

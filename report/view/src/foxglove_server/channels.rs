@@ -2,11 +2,11 @@
 
 use anyhow::{Context as _, Result};
 use bus::announcement::Announcement;
-use bus::watch::WatchedSample;
+use bus::watch::{WatchReader, WatchedSample};
 use foxglove::{ChannelId, Context, PartialMetadata, RawChannel, Schema, SinkId};
 use recorder::node::SHADOW_PREFIX;
 use recorder::writer::{MESSAGE_ENCODING, SCHEMA_ENCODING, channel_metadata};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The channels of a server.
@@ -78,6 +78,18 @@ impl Channels {
         Ok(())
     }
 
+    /// Sends the samples that have come. Returns the time of the newest one, and the topics that have no channel yet.
+    pub fn send_all(&self, samples: &mut WatchReader) -> (Option<u64>, BTreeSet<String>) {
+        let (mut newest_ns, mut unknown) = (None, BTreeSet::new());
+        samples.read(|sample| {
+            newest_ns = Some(sample.time_ns);
+            if !self.send(sample) {
+                unknown.insert(sample.topic.to_owned());
+            }
+        });
+        (newest_ns, unknown)
+    }
+
     /// Sends a sample to the clients that have subscribed to its topic; false if the topic has no channel yet.
     pub fn send(&self, sample: &WatchedSample<'_>) -> bool {
         let mut topics = self.topics();
@@ -102,8 +114,13 @@ impl Channels {
     }
 
     fn topics(&self) -> MutexGuard<'_, BTreeMap<String, Topic>> {
-        self.topics.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.topics)
     }
+}
+
+/// The content of a mutex, even where a thread panicked over it.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
