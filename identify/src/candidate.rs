@@ -74,11 +74,14 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
     (seen, unidentifiable)
 }
 
-/// The candidate of one wind for each flight: the mean, and the deviations. `None` where no flight has a number.
+/// The candidate of one level wind for each flight: the mean, and the deviations. `None` where no flight has a number.
 pub fn wind_of_each_flight(parameters: &Parameters) -> Option<Candidate> {
     let deviations = parameters.of_name(FLIGHT_WIND.name);
     let is_known = !deviations.is_empty();
-    is_known.then(|| Candidate { kind: &FLIGHT_WIND, free: [parameters.wind(), deviations].concat() })
+    let mut free = parameters.wind();
+    free.retain(|at| parameters.all[*at].index < FLIGHT_WIND.parameters.len());
+    free.extend(deviations);
+    is_known.then_some(Candidate { kind: &FLIGHT_WIND, free })
 }
 
 /// Returns the first requirement of an effect that `flights` do not meet; `None` if they meet all.

@@ -2,7 +2,8 @@
 //!
 //! The effect `wind` of the catalogue is then the mean over the fit flights. Each of them has a deviation from it; the first has the negative sum of
 //! the others, so that the deviations sum to zero. Deviations of zero are one wind for all flights. A flight without a number of its own, such as a
-//! test flight, has the mean.
+//! test flight, has the mean. All of these winds are level: near the ground the air moves level, and a vertical wind stands for thrust that the model
+//! lacks in some flights.
 
 use diagnostics::unit::WIND_VELOCITY;
 use plant::effect_parameters;
@@ -12,9 +13,9 @@ use plant::effects::{EffectKind, Quantity};
 pub static FLIGHT_WIND: EffectKind = EffectKind {
     name: "flight-wind",
     summary: "each flight has a wind of its own",
-    equation: "v_air += (x, y, z) in the world, with other values in each flight",
+    equation: "v_air += (x, y, 0) in the world, with other values in each flight",
     source: "own (a definition)",
-    validity: "constant over a flight",
+    validity: "constant over a flight, and level",
     parameters: Deviation::SPECS,
     needs: &[Quantity::Airspeed, Quantity::Force],
     // It begins at a start, which depends on the flights: see `wind_start`.
@@ -28,8 +29,6 @@ effect_parameters! {
         x: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 3.0, source: "that of `wind`";
         /// velocity of the air along y of the world
         y: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 3.0, source: "that of `wind`";
-        /// velocity of the air along z of the world
-        z: WIND_VELOCITY, min: -30.0, max: 30.0, neutral: Some(0.0), nominal: 0.2, source: "that of `wind`";
     }
 }
 

@@ -46,15 +46,21 @@ fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> (ComponentNoise, 
 }
 
 /// Sets the spread of the trims of each component. Torques about x and y come from the same propellers and batteries: they
-/// share theirs, since two flights often agree about one axis by chance.
+/// share theirs, since two flights often agree about one axis by chance. A force across the thrust that is greater than a crooked sensor or a skewed
+/// battery makes is no trim: it is a wind, or another effect that has to explain it.
 fn set_spreads(noises: &mut Noises, means: &BTreeMap<Component, Means>) {
     let tilting = [0, 1].map(|axis| (Equation::AngularAcceleration.name(), axis));
+    let across = [Equation::SpecificForce.name(), Equation::Acceleration.name()];
     for (component, noise) in noises {
         let alike = if tilting.contains(component) { &tilting[..] } else { std::slice::from_ref(component) };
-        noise.trim_variance =
-            spread(&alike.iter().filter_map(|of| means.get(of).cloned()).collect::<Vec<_>>());
+        let spread = spread(&alike.iter().filter_map(|of| means.get(of).cloned()).collect::<Vec<_>>());
+        let is_across = across.contains(&component.0) && component.1 < 2;
+        noise.trim_variance = if is_across { spread.min(MOST_TRIM_M_S2.powi(2)) } else { spread };
     }
 }
+
+/// Spread of the trims along x and y at most: gravity along an axis of a sensor that is 3° askew, as its bound is.
+const MOST_TRIM_M_S2: f64 = 0.514;
 
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
 const LEAST_NOISE: f64 = 1e-4;
