@@ -16,7 +16,7 @@
 //! | [`steps_ahead`], [`accelerations`] | errors of multi-step predictions; accelerations at every sample, for benchmarks |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
 //! | `candidate` | which effects these flights can show |
-//! | `flight_wind`, `wind_start`, `wind_reports`, `past_wind` | one wind for each flight; where a fit of it starts; its report; that of a test flight as its past shows it |
+//! | `flight_wind`, `wind_search`, `wind_start`, `wind_reports`, `past_wind` | one wind for each flight; the search for several; where a fit of it starts; its report; that of a test flight as its past shows it |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
@@ -119,6 +119,7 @@ mod weigh;
 mod whiteness;
 mod whitening;
 mod wind_reports;
+mod wind_search;
 mod wind_start;
 mod window;
 pub mod worth;

@@ -20,7 +20,7 @@
 //! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
 //! gain only together. They face the same tests; the chance of a false acceptance in that search is
 //! [`FALSE_RATE`] once more. So are pairs of a drag and one wind for each flight (`flight_wind`), whatever is left. The rounds end when nothing changes
-//! any more.
+//! any more. Where flights show several winds, the search begins with these and all by which they act (`wind_search`).
 
 use crate::candidate::{Candidate, free_parameters, with};
 use crate::fit::{Equations, Problem, unbounded};
@@ -33,6 +33,7 @@ use crate::judgement::{
 use crate::logging;
 use crate::normal::{self, Block};
 use crate::revision::{End, Revision, Revisions, Withdrawn, without_effects};
+use crate::wind_search::several_winds;
 use crate::worth::Worth;
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -110,6 +111,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
+    search.begin_in_several_winds(problem, candidates, progress);
     let mut open = candidates.to_vec();
     let mut withdrawn = Vec::new();
     let mut revisions = Revisions::default();
@@ -158,6 +160,25 @@ struct StepwiseSearch {
 }
 
 impl StepwiseSearch {
+    /// Begins with the winds of the flights and all by which they act, if the flights show several winds.
+    fn begin_in_several_winds(
+        &mut self,
+        problem: &mut Problem,
+        candidates: &[Candidate],
+        progress: &mut dyn FnMut(&str),
+    ) {
+        let Some((mut accepted, fitted)) = several_winds(problem, &self.base, candidates) else { return };
+        progress("several winds: all by which they act, together");
+        let fitted = without_idle(problem, fitted, &mut accepted, &[]);
+        let level = FALSE_RATE / accepted.len() as f64;
+        for (at, candidate) in accepted.iter().enumerate() {
+            let without = without(problem, &fitted, &accepted, at);
+            let judged = judged(problem, &without, candidate, fitted.clone(), level);
+            self.rounds.push(Round { judged: vec![judged], taken: Some(0) });
+        }
+        (self.accepted, self.base) = (accepted, fitted);
+    }
+
     /// Rounds among `candidates` until none changes anything; those `kept` are not given up for others.
     fn run(
         &mut self,

@@ -60,7 +60,7 @@ fn set_spreads(noises: &mut Noises, means: &BTreeMap<Component, Means>) {
 }
 
 /// Spread of the trims along x and y at most: gravity along an axis of a sensor that is 3° askew, as its bound is.
-const MOST_TRIM_M_S2: f64 = 0.514;
+pub const MOST_TRIM_M_S2: f64 = 0.514;
 
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.
 const LEAST_NOISE: f64 = 1e-4;
@@ -86,6 +86,17 @@ impl Problem<'_> {
             let total = normal::sum(&self.blocks(&self.estimation, &base.values, &all));
             let step = -(normal::inverse(&total.gram) * &total.gradient);
             self.noises = self.noises_after(&base.values, &all, &step);
+        }
+    }
+
+    /// Gives the flights the trims that another fit leaves with a step of `candidates`, and keeps the noise within each flight.
+    pub fn allow_trims_of(&mut self, base: &FitResult, candidates: &[Candidate]) {
+        let models = self.noises.clone();
+        self.weigh(base, candidates);
+        for (component, noise) in &mut self.noises {
+            if let Some(kept) = models.get(component) {
+                *noise = ComponentNoise { trim_variance: noise.trim_variance, ..kept.clone() };
+            }
         }
     }
 

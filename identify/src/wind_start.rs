@@ -3,7 +3,7 @@
 //! A wind acts by drag alone, and their product has no slope where both are zero. So a fit starts at the winds that the mean forces of each flight ask for
 //! under the drags that are known.
 
-use crate::candidate::has;
+use crate::candidate::{Candidate, has};
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::flight_wind::{FLIGHT_WIND, is_drag};
@@ -67,6 +67,18 @@ pub fn start(problem: &Problem, base: &FitResult) -> (Vec<f64>, f64) {
     let Some(values) = winds else { return (base.values.clone(), least) };
     let cost = problem.costs(&problem.estimation, &values).iter().sum::<f64>();
     (values, cost.min(least))
+}
+
+/// The values of `base` with each of these drags at a plausible value, and with the winds that the forces of each flight then ask for; `None` where
+/// nothing feels the air.
+pub fn start_beside(problem: &Problem, base: &FitResult, drags: &[Candidate]) -> Option<Vec<f64>> {
+    let mut values = base.values.clone();
+    let of_drags = drags.iter().filter(|candidate| is_drag(candidate.kind));
+    for at in of_drags.flat_map(|candidate| &candidate.free) {
+        let entry = &problem.model.parameters.all[*at];
+        values[*at] = entry.bounded(entry.baseline + entry.scale);
+    }
+    by_forces(problem, &values)
 }
 
 /// The values of `base` with each drag that was fitted to nothing at a plausible value. In the mean of several winds a drag may seem to be none.

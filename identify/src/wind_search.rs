@@ -1,0 +1,80 @@
+//! Several winds, found at once: one wind for each flight beside all effects by which a wind acts.
+//!
+//! A search that takes one effect after the other does not find them. Each drag is seen only beside the winds, and the winds only beside the drags; what a
+//! single one of them leaves counts as noise. So where constant forces across the thrust differ between flights by more than trims can, all of them are
+//! fitted together. Those that explain nothing are given up again (backward elimination: Draper and Smith, Applied Regression Analysis, 3rd ed., chapter 15).
+
+use crate::candidate::{Candidate, free_parameters};
+use crate::fit::Problem;
+use crate::fit_result::FitResult;
+use crate::flight_wind::{FLIGHT_WIND, is_drag};
+use crate::judgement::{FALSE_RATE, p_value};
+use crate::prepared::Equation;
+use crate::rows::column;
+use crate::weigh::MOST_TRIM_M_S2;
+use crate::wind_start::start_beside;
+use plant::effects::Action;
+
+/// One wind for all has to leave at least so many times the squared error.
+const LEAST_RATIO: f64 = 1.5;
+
+/// The winds of the flights beside the effects by which they act, and the fit of all; `None` where one wind explains the flights nearly as well.
+pub fn several_winds(
+    problem: &mut Problem,
+    declared: &FitResult,
+    candidates: &[Candidate],
+) -> Option<(Vec<Candidate>, FitResult)> {
+    let winds = candidates.iter().find(|candidate| *candidate.kind == FLIGHT_WIND)?;
+    if greatest_spread_m_s2(problem, &declared.values) < MOST_TRIM_M_S2 {
+        return None;
+    }
+    let mut all: Vec<Candidate> = candidates.iter().filter(|candidate| acts(candidate)).cloned().collect();
+    problem.weigh(declared, &all);
+    let start = start_beside(problem, declared, &all)?;
+    let one = free_parameters(&all);
+    all.push(winds.clone());
+    let free = free_parameters(&all);
+    let mut several = problem.fitted(&start, &free);
+    problem.weigh(&several, &all);
+    several = problem.fitted(&several.values, &free);
+    let level = winds.free.iter().filter(|at| problem.model.parameters.all[**at].flight.is_none());
+    let shared: Vec<usize> = one.into_iter().chain(level.copied()).collect();
+    let mut values = several.values.clone();
+    let deviations = problem.model.parameters.of_name(FLIGHT_WIND.name);
+    deviations.into_iter().for_each(|at| values[at] = 0.0);
+    let one = problem.fitted(&values, &shared);
+    problem.allow_trims_of(&one, &all);
+    let [one, several] = [one, several].map(|fit| problem.fitted(&fit.values, &fit.free));
+    let is_gain = p_value(&one.validation_costs, &several.validation_costs) < FALSE_RATE
+        && one.validation_cost() > LEAST_RATIO * several.validation_cost();
+    is_gain.then_some((all, several))
+}
+
+/// True for effects by which a wind acts, and for one number of the thrust of all rotors, which the lift of a wind changes.
+fn acts(candidate: &Candidate) -> bool {
+    let kind = candidate.kind;
+    let is_vehicle = kind.actions.iter().any(|action| matches!(action, Action::Vehicle(_)));
+    let is_thrust = is_vehicle && kind.needs.is_empty() && kind.is_linear && candidate.free.len() == 1;
+    is_drag(kind) || is_thrust
+}
+
+/// The greatest standard deviation between flights of the mean force along x or y that the model lacks, in m/s^2.
+fn greatest_spread_m_s2(problem: &Problem, values: &[f64]) -> f64 {
+    let of = |equation: Equation, axis: usize| {
+        let mean = |flight| {
+            let rows = column(flight, &problem.model.residual_under(flight, values), equation, axis);
+            (!rows.is_empty()).then(|| rows.iter().sum::<f64>() / rows.len() as f64)
+        };
+        let means: Vec<f64> = problem.estimation.iter().filter_map(mean).collect();
+        deviation(&means)
+    };
+    let equations = [Equation::SpecificForce, Equation::Acceleration];
+    equations.into_iter().flat_map(|equation| [0, 1].map(|axis| of(equation, axis))).fold(0.0, f64::max)
+}
+
+/// The standard deviation of a sample; 0 of less than two.
+fn deviation(of: &[f64]) -> f64 {
+    let mean = of.iter().sum::<f64>() / of.len().max(1) as f64;
+    let squares: f64 = of.iter().map(|one| (one - mean) * (one - mean)).sum();
+    (squares / (of.len().max(2) - 1) as f64).sqrt()
+}
