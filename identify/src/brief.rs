@@ -414,7 +414,7 @@ mod tests {
     fn winds_of_flights_are_counted() {
         let wind = |flight: &str, [x, y]: [f64; 2]| {
             let along = |value| Estimate { value, ..coefficient() };
-            FlightWind { flight: flight.to_owned(), x: along(x), y: along(y), z: along(0.0) }
+            FlightWind { flight: flight.to_owned(), x: along(x), y: along(y) }
         };
         let winds = vec![wind("calm", [0.0, 0.0]), wind("breeze", [3.0, -4.0])];
         let brief = Brief::of(&Report { winds: winds.clone(), ..report() });

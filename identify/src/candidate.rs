@@ -4,7 +4,7 @@ use crate::flight_wind::FLIGHT_WIND;
 use crate::parameter::Parameters;
 use crate::prepared::{Equation, Prepared};
 use flights::Flight;
-use plant::effects::{EffectKind, FitAs, Quantity};
+use plant::effects::{EffectKind, FitAs, Quantity, WIND};
 
 /// Need of effects that show in torques, or in the time at which commands act.
 pub const FAST_COMMANDS: &str =
@@ -28,9 +28,11 @@ impl Candidate {
         self.kind.steady_state && self.kind.turns_steadily
     }
 
-    /// True if each of its parameters is one of `others`.
+    /// True if each of its parameters is one of `others`. One wind for all is in winds of flights, although these are level.
     pub fn is_in(&self, others: &[Candidate]) -> bool {
-        self.free.iter().all(|at| others.iter().any(|other| other.free.contains(at)))
+        let are_winds = |other: &Candidate| *self.kind == WIND && *other.kind == FLIGHT_WIND;
+        others.iter().any(are_winds)
+            || self.free.iter().all(|at| others.iter().any(|other| other.free.contains(at)))
     }
 
     /// The parameters `free` without its own.
@@ -78,10 +80,8 @@ pub fn candidates(parameters: &Parameters, flights: &[&Prepared]) -> (Vec<Candid
 pub fn wind_of_each_flight(parameters: &Parameters) -> Option<Candidate> {
     let deviations = parameters.of_name(FLIGHT_WIND.name);
     let is_known = !deviations.is_empty();
-    let mut free = parameters.wind();
-    free.retain(|at| parameters.all[*at].index < FLIGHT_WIND.parameters.len());
-    free.extend(deviations);
-    is_known.then_some(Candidate { kind: &FLIGHT_WIND, free })
+    let free = || [parameters.level_wind().to_vec(), deviations].concat();
+    is_known.then(|| Candidate { kind: &FLIGHT_WIND, free: free() })
 }
 
 /// Returns the first requirement of an effect that `flights` do not meet; `None` if they meet all.
@@ -201,7 +201,10 @@ mod tests {
         assert_eq!(with(&accepted, &winds), [drag.clone(), winds.clone()]);
         assert!(wind.is_in(&[drag.clone(), winds.clone()]) && !winds.is_in(&accepted));
         assert_eq!(winds.beside(&free_parameters(&accepted)), [1]);
-        assert_eq!(with(&accepted, &of(&[6])), [drag, wind, of(&[6])]);
+        assert_eq!(with(&accepted, &of(&[6])), [drag.clone(), wind, of(&[6])]);
+        let common = Candidate { kind: &WIND, free: vec![2, 3, 7] };
+        assert_eq!(with(&[drag.clone(), common.clone()], &winds), [drag, winds.clone()]);
+        assert!(common.is_in(&[winds]));
     }
 
     /// Commands and an inertial unit alone show only the sum of both delays.

@@ -71,6 +71,12 @@ impl Parameters {
         (0..self.all.len()).filter(|at| *self.all[*at].kind == WIND).collect()
     }
 
+    /// The places of the level part of that wind: x and y.
+    pub fn level_wind(&self) -> [usize; 2] {
+        let wind = self.wind();
+        [wind[0], wind[1]]
+    }
+
     /// The parameter at `at` as it acts on the fit flight of this number: the place of the one that is moved by it, and the factor between both;
     /// `None` if it does not act there.
     pub fn acting(&self, at: usize, flight: Option<usize>) -> Option<(usize, f64)> {

@@ -30,7 +30,7 @@ pub fn stages(problem: &Problem, flight: &Prepared, values: &[f64]) -> Vec<Stage
     if flight.number.is_some() {
         return Vec::new();
     }
-    let wind = parameters.wind();
+    let wind = parameters.level_wind();
     let knots = problem.block_knots(flight);
     let known_s = |end: usize| clock.at(flight.layout.knots[end - 1]) + lag_s(flight);
     let (start_s, last_s) = (clock.at(0), clock.at(clock.count - 1));
@@ -60,14 +60,14 @@ fn moved(problem: &Problem, past: &Block, values: &[f64], wind: &[usize]) -> Vec
 }
 
 /// Inverse variances of the winds of the fit flights, by axis; `None` where these have one wind.
-fn precisions(deviations_m_s: &[[f64; 3]]) -> Option<[f64; 3]> {
+fn precisions(deviations_m_s: &[[f64; 2]]) -> Option<[f64; 2]> {
     let is_one = deviations_m_s.iter().flatten().all(|deviation| *deviation == 0.0);
     let others = deviations_m_s.len().saturating_sub(1) as f64;
     let precision = |axis: usize| {
         let variance = deviations_m_s.iter().map(|of| of[axis] * of[axis]).sum::<f64>() / others;
         1.0 / variance.max(LEAST_SPREAD_M_S * LEAST_SPREAD_M_S)
     };
-    (!is_one).then(|| [0, 1, 2].map(precision))
+    (!is_one).then(|| [0, 1].map(precision))
 }
 
 #[cfg(test)]
@@ -76,15 +76,14 @@ mod tests {
 
     #[test]
     fn winds_that_differ_much_tell_little_of_another_one() {
-        let precisions = precisions(&[[3.0, 0.0, 0.1], [-3.0, 0.0, -0.1]]).expect("two winds");
+        let precisions = precisions(&[[3.0, 0.1], [-3.0, -0.1]]).expect("two winds");
         assert!((precisions[0] - 1.0 / 18.0).abs() < 1e-12, "{precisions:?}");
         assert!((precisions[1] - 1.0 / 0.09).abs() < 1e-9, "{precisions:?}");
-        assert!((precisions[2] - 1.0 / 0.09).abs() < 1e-9, "{precisions:?}");
     }
 
     #[test]
     fn one_wind_has_no_stages() {
-        assert_eq!(precisions(&[[0.0; 3]; 3]), None);
+        assert_eq!(precisions(&[[0.0; 2]; 3]), None);
         assert_eq!(precisions(&[]), None);
     }
 }

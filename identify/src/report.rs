@@ -199,7 +199,7 @@ const NOTHING_TO_COMPARE: &str = "nothing to compare the pose with; log gyroscop
 const APART: &str = "the pose agrees with gyroscope and accelerometer at no delay up to 0.4 s; their clocks differ by more, or one \
                      of them is wrong: set `delay_s`, or choose one clock";
 
-/// The wind of one fit flight: the velocity of the air in the world.
+/// The level wind of one fit flight: the velocity of the air in the world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FlightWind {
     /// The flight.
@@ -208,15 +208,13 @@ pub struct FlightWind {
     pub x: Estimate,
     /// Along y.
     pub y: Estimate,
-    /// Along z.
-    pub z: Estimate,
 }
 
 impl FlightWind {
     /// Its speed, in m/s.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
-        [self.x, self.y, self.z].map(|along| along.value * along.value).iter().sum::<f64>().sqrt()
+        [self.x, self.y].map(|along| along.value * along.value).iter().sum::<f64>().sqrt()
     }
 }
 
@@ -455,12 +453,12 @@ impl Report {
         if !self.winds.is_empty() {
             writeln!(f, "\neach fit flight has a wind of its own (m/s, 95 %):")?;
         }
-        for FlightWind { flight, x, y, z } in &self.winds {
+        for FlightWind { flight, x, y } in &self.winds {
             let along = |Estimate { value, low, high, .. }: &Estimate| {
                 let [value, low, high] = [*value, *low, *high].map(rounded);
                 format!("{value} ({low} ... {high})")
             };
-            writeln!(f, "  {flight:28} x {}  y {}  z {}", along(x), along(y), along(z))?;
+            writeln!(f, "  {flight:28} x {}  y {}", along(x), along(y))?;
         }
         if !self.winds.is_empty() {
             writeln!(
@@ -636,14 +634,13 @@ mod tests {
             flight: flight.to_owned(),
             x: along(x),
             y: along(y),
-            z: along(1.0),
         };
         let winds = vec![wind("calm", [0.0, 0.0]), wind("gale", [-8.0, 4.0])];
         let text = Report { winds, ..Report::of_nothing() }.to_string();
-        let gale = "x -8.000 (-8.500 ... -7.500)  y 4.000 (3.500 ... 4.500)  z 1.000 (0.5000 ... 1.500)\n";
+        let gale = "x -8.000 (-8.500 ... -7.500)  y 4.000 (3.500 ... 4.500)\n";
         assert!(text.contains("\neach fit flight has a wind of its own (m/s, 95 %):\n  calm "), "{text}");
         assert!(text.contains(gale), "{text}");
-        assert!(text.contains("fitted in 2 flights, 2 winds: 1.000 to 9.000 m/s\n"), "{text}");
+        assert!(text.contains("fitted in 2 flights, 2 winds: 0 to 8.944 m/s\n"), "{text}");
         assert!(!Report::of_nothing().to_string().contains("wind"));
     }
 

@@ -16,8 +16,8 @@ pub fn winds(problem: &Problem, selection: &Selection) -> Vec<FlightWind> {
     }
     let of_flight = |flight: &Prepared| {
         let number = flight.number?;
-        let [x, y, z] = [0, 1, 2].map(|axis| estimate(problem, selection.flown(), number, axis));
-        Some(FlightWind { flight: flight.flight.name.clone(), x, y, z })
+        let [x, y] = [0, 1].map(|axis| estimate(problem, selection.flown(), number, axis));
+        Some(FlightWind { flight: flight.flight.name.clone(), x, y })
     };
     problem.estimation.iter().filter_map(of_flight).collect()
 }

@@ -44,11 +44,11 @@ impl Problem<'_> {
 }
 
 /// The deviations of the winds of the fit flights from their mean, by flight, in m/s; none where no flight has a number.
-pub fn deviations_m_s(parameters: &Parameters, values: &[f64]) -> Vec<[f64; 3]> {
-    let mut deviations: Vec<[f64; 3]> = Vec::new();
+pub fn deviations_m_s(parameters: &Parameters, values: &[f64]) -> Vec<[f64; 2]> {
+    let mut deviations: Vec<[f64; 2]> = Vec::new();
     for (entry, value) in parameters.all.iter().zip(values) {
         let Some(flight) = entry.flight else { continue };
-        deviations.resize(deviations.len().max(flight + 1), [0.0; 3]);
+        deviations.resize(deviations.len().max(flight + 1), [0.0; 2]);
         deviations[flight][entry.index] = *value;
         deviations[0][entry.index] -= value;
     }
@@ -99,7 +99,9 @@ fn by_forces(problem: &Problem, values: &[f64]) -> Option<Vec<f64>> {
     let mut start = values.to_vec();
     let deviations = parameters.of_name(FLIGHT_WIND.name);
     deviations.iter().for_each(|at| start[*at] = 0.0);
-    let level = [parameters.wind()[0], parameters.wind()[1]];
+    // All winds are level then, also where one wind for all was not.
+    parameters.wind().into_iter().for_each(|at| start[at] = parameters.all[at].baseline);
+    let level = parameters.level_wind();
     let of_flight = |flight: &Prepared| -> Option<[f64; 2]> {
         let mut values = start.clone();
         for _ in 0..START_STEPS {

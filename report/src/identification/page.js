@@ -121,8 +121,8 @@ function drawFaults() {
 
 function drawWinds() {
   const along = ({ value, low, high }) => [number(value), `${number(low)} to ${number(high)}`];
-  fillPart("winds", [left("flight"), ...["x", "y", "z"].flatMap((axis) => [axis, "95 % interval"])],
-    report.winds.map(({ flight, x, y, z }) => [left(flight), ...[x, y, z].flatMap(along)]));
+  fillPart("winds", [left("flight"), ...["x", "y"].flatMap((axis) => [axis, "95 % interval"])],
+    report.winds.map(({ flight, x, y }) => [left(flight), ...[x, y].flatMap(along)]));
 }
 
 // One row per parameter; the effect stands in the first.
