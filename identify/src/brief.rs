@@ -381,11 +381,7 @@ mod tests {
         let nothing = Brief::of(&Report::of_nothing());
         assert_eq!(nothing.answer, "The declared vehicle file says all that these flights can show.");
         assert!(nothing.missing.is_empty() && nothing.changes.is_empty(), "{nothing:?}");
-        let found = Withdrawn {
-            effect: "ground-effect",
-            reason: "no prediction error falls noticeably".to_owned(),
-            at_bound: false,
-        };
+        let found = Withdrawn::because("ground-effect", "no prediction error falls noticeably".to_owned());
         let small = Report { withdrawn: vec![found.clone()], ..Report::of_nothing() };
         assert!(Brief::of(&small).answer.contains("They show ground-effect, too small"));
         assert!(
@@ -393,7 +389,7 @@ mod tests {
                 .to_string()
                 .contains("verdict: nothing. The equations fit better with ground-effect, but no prediction")
         );
-        let reached = Withdrawn { effect: "sensor-bias", at_bound: true, ..found };
+        let reached = Withdrawn { effect: "sensor-bias", at_bound: true, ..found.clone() };
         let beyond = Report { withdrawn: vec![reached], ..Report::of_nothing() };
         assert!(
             Brief::of(&beyond)
@@ -405,6 +401,12 @@ mod tests {
                 .to_string()
                 .contains("verdict: nothing. The equations put the estimate of sensor-bias at its bound")
         );
+        let replaced = Withdrawn { replaced_by: Some("mass-error"), ..found.clone() };
+        let text = Report { withdrawn: vec![replaced.clone()], ..Report::of_nothing() }.to_string();
+        assert!(text.contains("verdict: nothing. No candidate makes"), "{text}");
+        let mass = Withdrawn { effect: "mass-error", at_bound: true, ..found.clone() };
+        let answer = Brief::of(&Report { withdrawn: vec![replaced, mass], ..Report::of_nothing() }).answer;
+        assert!(answer.contains("They put the estimate of mass-error at its bound"), "{answer}");
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");
         assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);

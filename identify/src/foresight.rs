@@ -187,6 +187,16 @@ impl Foresight {
     }
 }
 
+#[cfg(test)]
+impl Foresight {
+    /// The same with all errors so many times as large.
+    pub fn times(mut self, factor: f64) -> Self {
+        let squares = self.squares.values_mut().flat_map(|(squares, _)| squares);
+        squares.for_each(|square| *square *= factor * factor);
+        self
+    }
+}
+
 /// A mean square; that of a prediction that diverged is very great.
 fn finite(square: f64) -> f64 {
     if square.is_finite() { square } else { DIVERGED }

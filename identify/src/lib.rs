@@ -50,6 +50,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+// Simulated flights of the tests name this crate, also in its own unit tests.
+#[cfg(test)]
+extern crate self as identify;
+
 pub mod accelerations;
 mod align;
 pub mod brief;
@@ -106,6 +110,9 @@ mod select;
 mod sensing;
 mod sensor_effects;
 mod simpler;
+#[cfg(test)]
+#[path = "../tests/simulated/mod.rs"]
+mod simulated;
 mod spinning;
 pub mod statistics;
 pub mod steps_ahead;

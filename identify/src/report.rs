@@ -321,9 +321,11 @@ impl Report {
         Ok(())
     }
 
-    /// The withdrawn effects that reached a bound, or the others.
+    /// The withdrawn effects that reached a bound, or the others. Effects that another one replaced are in neither list: they are not small.
     pub(crate) fn withdrawn_names(&self, at_bound: bool) -> Vec<&'static str> {
-        let withdrawn = self.withdrawn.iter().filter(|withdrawn| withdrawn.at_bound == at_bound);
+        let is_listed =
+            |withdrawn: &&Withdrawn| withdrawn.at_bound == at_bound && withdrawn.replaced_by.is_none();
+        let withdrawn = self.withdrawn.iter().filter(is_listed);
         withdrawn.map(|withdrawn| withdrawn.effect).collect()
     }
 

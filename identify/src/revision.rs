@@ -38,6 +38,26 @@ pub struct Withdrawn {
     pub reason: String,
     /// True if a parameter reached its bound: another cause is at work, which no name is given.
     pub at_bound: bool,
+    /// The effect that was accepted instead of this and another one; `None` for all other reasons.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replaced_by: Option<&'static str>,
+}
+
+impl Withdrawn {
+    /// An effect that was withdrawn for this reason. Neither did it reach a bound, nor was it replaced.
+    pub fn because(effect: &'static str, reason: String) -> Self {
+        Self { effect, reason, at_bound: false, replaced_by: None }
+    }
+
+    /// The two effects that `exchange` replaces.
+    fn replaced(exchange: &Exchange) -> Vec<Self> {
+        let Exchange { new, old, .. } = exchange;
+        let new = new.kind.name;
+        let reason =
+            format!("{new} alone predicts as well as {} together, with fewer parameters", old.join(" and "));
+        let withdrawn = |effect| Self { replaced_by: Some(new), ..Self::because(effect, reason.clone()) };
+        old.map(withdrawn).to_vec()
+    }
 }
 
 /// The next turn of a search.
@@ -200,7 +220,7 @@ impl Found<'_, '_> {
             let (effect, chance) = unsure.max_by(|a, b| a.1.total_cmp(&b.1))?;
             let reason =
                 format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            Some(Withdrawn { effect, reason, at_bound: false })
+            Some(Withdrawn::because(effect, reason))
         };
         beyond_bounds(self.problem, self.accepted, fitted).or_else(by_chance)
     }
@@ -298,13 +318,7 @@ impl Found<'_, '_> {
             is_sound && !now.is_worth_more_than(&predictions())
         };
         let found = exchanges(problem, (accepted, base), given_up, kept).into_iter().find(is_as_good)?;
-        let reason = format!(
-            "{} instead of {} predicts as well, with fewer parameters",
-            found.new.kind.name,
-            found.old.join(" and ")
-        );
-        let withdrawn = |effect| Withdrawn { effect, reason: reason.clone(), at_bound: false };
-        let old = found.old.map(withdrawn).to_vec();
+        let old = Withdrawn::replaced(&found);
         Some(Revision::Instead(Box::new(found), old))
     }
 
@@ -370,7 +384,7 @@ impl Predictions {
         let [without, with] = [without, with].map(|error| quantity(error, unit));
         let reason =
             format!("the error of {channel} after {horizon_s} s is {without} without it, {with} with it");
-        Some(Withdrawn { effect, reason, at_bound: false })
+        Some(Withdrawn::because(effect, reason))
     }
 
     /// The effects, of those that may be, without which no error grows; the one that gains least first.
@@ -389,7 +403,7 @@ impl Predictions {
                 "no prediction error falls noticeably with it; most, the error of {channel} after {horizon_s} s, is {without} \
                  without it, {with} with it"
             );
-            Withdrawn { effect, reason, at_bound: false }
+            Withdrawn::because(effect, reason)
         };
         idle.into_iter().map(withdrawn).collect()
     }
@@ -404,7 +418,7 @@ fn unrefined_foresight(problem: &Problem, fitted: &FitResult) -> Foresight {
 pub fn beyond_bounds(problem: &Problem, accepted: &[Candidate], fitted: &FitResult) -> Option<Withdrawn> {
     let of_candidate = |candidate: &Candidate| {
         let reason = at_bound(problem, candidate, fitted)?;
-        Some(Withdrawn { effect: candidate.kind.name, reason, at_bound: true })
+        Some(Withdrawn { at_bound: true, ..Withdrawn::because(candidate.kind.name, reason) })
     };
     accepted.iter().find_map(of_candidate)
 }
@@ -424,4 +438,36 @@ pub fn without_effects(
         .for_each(|at| start[at] = problem.model.parameters.all[at].baseline);
     let fitted = problem.fitted(&start, &free_parameters(&others));
     (others, fitted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::problem;
+    use crate::simulated::effect;
+    use crate::test_flights::{candidate, simulated, with_light_rotors};
+
+    /// The equations allow the exchange. Predictions with half the errors do not.
+    #[test]
+    fn two_effects_are_exchanged_only_where_one_predicts_as_well() {
+        let vehicle = with_light_rotors();
+        let set = simulated(&vehicle, &[effect("mass-error", &[("error", 0.2)])]);
+        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let [mass, thrust, inertia] =
+            ["mass-error", "thrust-scale", "inertia-error"].map(|name| candidate(&problem, name));
+        let declared = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        problem.weigh(&declared, std::slice::from_ref(&mass));
+        let accepted = [thrust, inertia];
+        let base = problem.fitted(&declared.values, &free_parameters(&accepted));
+        let found = Found { problem: &problem, accepted: &accepted, base: &base };
+        let exchanged = |times: f64| {
+            let now = found.predictions().with.times(times);
+            found.simpler(&now, std::slice::from_ref(&mass), &[], None)
+        };
+        let Some(Revision::Instead(exchange, old)) = exchanged(1.0) else { panic!("no exchange") };
+        assert_eq!(exchange.accepted, [mass.clone()]);
+        assert_eq!(old.len(), 2);
+        let worse = exchanged(0.5);
+        assert!(worse.is_none(), "{worse:?}");
+    }
 }

@@ -112,44 +112,7 @@ pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dy
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
     search.begin_in_several_winds(problem, candidates, progress);
-    let mut open = candidates.to_vec();
-    let mut withdrawn = Vec::new();
-    let mut revisions = Revisions::default();
-    let End { refined, worths } = loop {
-        search.run(problem, &open, revisions.added(), progress);
-        problem.weigh(&search.base, candidates);
-        let fitted = problem.fitted(&search.base.values, &free_parameters(&search.accepted));
-        search.base = held_at_limits(problem, fitted);
-        let StepwiseSearch { accepted, base, rounds } = &mut search;
-        let mut given_up: Vec<Candidate> = Vec::new();
-        for Judged { candidate, .. } in rounds.iter().filter_map(Round::taken) {
-            if candidate.is_in(&open) && !candidate.is_in(accepted) && !candidate.is_in(&given_up) {
-                given_up.push(candidate.clone());
-            }
-        }
-        match revisions.next(problem, (accepted, base), (&open, &given_up), progress) {
-            Revision::Instead(exchange, old) => {
-                open.retain(|candidate| !exchange.old.contains(&candidate.kind.name));
-                withdrawn.extend(old);
-                (*accepted, *base) = (exchange.accepted, exchange.fitted);
-            }
-            Revision::Without(found) => {
-                let effects: Vec<&str> = found.iter().map(|withdrawn| withdrawn.effect).collect();
-                (*accepted, *base) = without_effects(problem, accepted, base, &effects);
-                open.retain(|candidate| !effects.contains(&candidate.kind.name));
-                withdrawn.extend(found);
-            }
-            Revision::With(found) => {
-                accepted.push(found.candidate.clone());
-                *base = found.fitted.clone();
-                rounds.push(Round { judged: vec![*found], taken: Some(0) });
-            }
-            Revision::Done(end) => break end,
-        }
-    };
-    let StepwiseSearch { accepted, rounds, base: after } = search;
-    let before = problem.fitted(&declared, &[]);
-    Selection { accepted, before, after, refined, rounds, withdrawn, worths }
+    search.finished(problem, candidates, progress)
 }
 
 /// State of a selection.
@@ -177,6 +140,59 @@ impl StepwiseSearch {
             self.rounds.push(Round { judged: vec![judged], taken: Some(0) });
         }
         (self.accepted, self.base) = (accepted, fitted);
+    }
+
+    /// The selection among `candidates` after rounds and revisions, until neither changes anything.
+    fn finished(
+        mut self,
+        problem: &mut Problem,
+        candidates: &[Candidate],
+        progress: &mut dyn FnMut(&str),
+    ) -> Selection {
+        let mut open = candidates.to_vec();
+        let mut withdrawn = Vec::new();
+        let mut revisions = Revisions::default();
+        let End { refined, worths } = loop {
+            self.run(problem, &open, revisions.added(), progress);
+            problem.weigh(&self.base, candidates);
+            let fitted = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
+            self.base = held_at_limits(problem, fitted);
+            let given_up = self.given_up(&open);
+            let Self { accepted, base, rounds } = &mut self;
+            match revisions.next(problem, (accepted, base), (&open, &given_up), progress) {
+                Revision::Instead(exchange, old) => {
+                    open.retain(|candidate| !exchange.closes(candidate));
+                    withdrawn.extend(old);
+                    (*accepted, *base) = (exchange.accepted, exchange.fitted);
+                }
+                Revision::Without(found) => {
+                    let effects: Vec<&str> = found.iter().map(|withdrawn| withdrawn.effect).collect();
+                    (*accepted, *base) = without_effects(problem, accepted, base, &effects);
+                    open.retain(|candidate| !effects.contains(&candidate.kind.name));
+                    withdrawn.extend(found);
+                }
+                Revision::With(found) => {
+                    accepted.push(found.candidate.clone());
+                    *base = found.fitted.clone();
+                    rounds.push(Round { judged: vec![*found], taken: Some(0) });
+                }
+                Revision::Done(end) => break end,
+            }
+        };
+        let Self { accepted, rounds, base: after } = self;
+        let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        Selection { accepted, before, after, refined, rounds, withdrawn, worths }
+    }
+
+    /// The `open` candidates that rounds took and that are no longer accepted.
+    fn given_up(&self, open: &[Candidate]) -> Vec<Candidate> {
+        let mut given_up: Vec<Candidate> = Vec::new();
+        for Judged { candidate, .. } in self.rounds.iter().filter_map(Round::taken) {
+            if candidate.is_in(open) && !candidate.is_in(&self.accepted) && !candidate.is_in(&given_up) {
+                given_up.push(candidate.clone());
+            }
+        }
+        given_up
     }
 
     /// Rounds among `candidates` until none changes anything; those `kept` are not given up for others.
@@ -501,5 +517,60 @@ fn promise(
         },
         estimation_costs: after(estimation),
         free,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::problem;
+    use crate::simulated::effect;
+    use crate::test_flights::{candidate, simulated, with_light_rotors};
+    use plant::effects::Effect;
+
+    /// The selection among mass, thrust and inertia where the mass was taken and given up for the other two, and the problem's mass.
+    fn selected(truth: &[Effect]) -> (Selection, usize) {
+        let vehicle = with_light_rotors();
+        let set = simulated(&vehicle, truth);
+        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let [mass, thrust, inertia] =
+            ["mass-error", "thrust-scale", "inertia-error"].map(|name| candidate(&problem, name));
+        let candidates = [mass.clone(), thrust.clone(), inertia.clone()];
+        let declared = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        problem.weigh(&declared, &candidates);
+        let declared = problem.fitted(&declared.values, &[]);
+        let alone = fitted(&problem, &declared, &[], &mass);
+        let taken = judged(&problem, &declared, &mass, alone, FALSE_RATE);
+        let accepted = vec![thrust, inertia];
+        let base = problem.fitted(&declared.values, &free_parameters(&accepted));
+        let rounds = vec![Round { judged: vec![taken], taken: Some(0) }];
+        let search = StepwiseSearch { accepted, rounds, base };
+        (search.finished(&mut problem, &candidates, &mut |_| ()), mass.free[0])
+    }
+
+    fn names(selection: &Selection) -> Vec<&'static str> {
+        selection.accepted.iter().map(|candidate| candidate.kind.name).collect()
+    }
+
+    #[test]
+    fn a_mass_is_named_instead_of_the_thrust_and_the_inertia_that_stand_for_it() {
+        let (found, mass) = selected(&[effect("mass-error", &[("error", 0.2)])]);
+        assert_eq!(names(&found), ["mass-error"], "{:?}", found.withdrawn);
+        let error = found.flown().values[mass];
+        assert!((error - 0.2).abs() < 0.01, "{error}");
+        let replaced: Vec<_> = found.withdrawn.iter().map(|one| (one.effect, one.replaced_by)).collect();
+        let by = Some("mass-error");
+        assert_eq!(replaced, [("inertia-error", by), ("thrust-scale", by)], "{:?}", found.withdrawn);
+        let reason = "mass-error alone predicts as well as inertia-error and thrust-scale together, with fewer parameters";
+        assert!(found.withdrawn.iter().all(|one| one.reason == reason), "{:?}", found.withdrawn);
+    }
+
+    /// More mass would turn the vehicle by a third too fast.
+    #[test]
+    fn thrust_and_inertia_stay_where_a_mass_predicts_worse() {
+        let inertia = effect("inertia-error", &[("error_xx", 0.2), ("error_yy", 0.2)]);
+        let (found, _) = selected(&[effect("thrust-scale", &[("error", -0.1)]), inertia]);
+        assert_eq!(names(&found), ["thrust-scale", "inertia-error"], "{:?}", found.withdrawn);
+        assert!(found.withdrawn.is_empty(), "{:?}", found.withdrawn);
     }
 }

@@ -5,7 +5,7 @@
 //! accepted and given up, and nothing brings it back. Of two models that predict as well, the one with fewer parameters
 //! is taken (parsimony: Ljung, System Identification, 2nd ed., section 16.8).
 
-use crate::candidate::{Candidate, free_parameters};
+use crate::candidate::{Candidate, free_parameters, with};
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::judgement::fitted;
@@ -23,10 +23,19 @@ pub struct Exchange {
     pub new: Candidate,
     /// Names of the two that it stands for.
     pub old: [&'static str; 2],
+    /// The accepted candidates of these two.
+    pub dropped: Vec<Candidate>,
     /// The accepted candidates after it.
     pub accepted: Vec<Candidate>,
     /// Their fit.
     pub fitted: FitResult,
+}
+
+impl Exchange {
+    /// True if the search goes on without `candidate`. Other parts of the two effects, such as other rotors, stay open.
+    pub fn closes(&self, candidate: &Candidate) -> bool {
+        self.dropped.contains(candidate)
+    }
 }
 
 /// The exchanges of two of `accepted` for one of `given_up` that the validation data do not rule out: those that spare
@@ -71,22 +80,24 @@ fn exchange(
     old: [&'static str; 2],
     kept: &[Candidate],
 ) -> Option<Exchange> {
-    // Of an effect with a candidate for each parameter the others would be closed with it.
+    // Reports name effects: no effect is named instead of a part of itself.
     if old.contains(&new.kind.name) {
         return None;
     }
     let is_old = |candidate: &Candidate| old.contains(&candidate.kind.name);
-    let (dropped, mut others): (Vec<Candidate>, Vec<Candidate>) = accepted.iter().cloned().partition(is_old);
-    let spared = free_parameters(&dropped);
-    if spared.len() <= new.free.len() || dropped.iter().any(|candidate| kept.contains(candidate)) {
+    let (dropped, others): (Vec<Candidate>, Vec<Candidate>) = accepted.iter().cloned().partition(is_old);
+    let after = with(&others, new);
+    let left: Vec<Candidate> = accepted.iter().filter(|one| !after.contains(one)).cloned().collect();
+    let is_smaller = free_parameters(&after).len() < free_parameters(accepted).len();
+    if !is_smaller || left.iter().any(|candidate| kept.contains(candidate)) {
         return None;
     }
     let mut values = base.values.clone();
-    spared.iter().for_each(|at| values[*at] = problem.model.parameters.all[*at].baseline);
-    let without = problem.fitted(&values, &free_parameters(&others));
-    let fitted = fitted(problem, &without, &others, new);
-    others.push(new.clone());
-    Some(Exchange { new: new.clone(), old, accepted: others, fitted })
+    free_parameters(&left).iter().for_each(|at| values[*at] = problem.model.parameters.all[*at].baseline);
+    let stay: Vec<Candidate> = after.iter().filter(|one| *one != new).cloned().collect();
+    let without = problem.fitted(&values, &free_parameters(&stay));
+    let fitted = fitted(problem, &without, &stay, new);
+    Some(Exchange { new: new.clone(), old, dropped, accepted: after, fitted })
 }
 
 #[allow(clippy::disallowed_types, reason = "not in a component: numbers of a report's test")]
@@ -96,7 +107,7 @@ mod tests {
     use crate::model::Model;
     use crate::parameter::Parameters;
     use crate::prepared::{Prepared, Propulsion};
-    use crate::test_flights::{flown, hummingbird};
+    use crate::test_flights::{candidate, flown, hummingbird};
     use crate::whitening::Noises;
     use flights::Flight;
 
@@ -127,11 +138,6 @@ mod tests {
         problem
     }
 
-    fn candidate(problem: &Problem, effect: &str) -> Candidate {
-        let free = problem.model.parameters.of_name(effect);
-        Candidate { kind: problem.model.parameters.all[free[0]].kind, free }
-    }
-
     #[test]
     fn a_mass_that_was_given_up_stands_for_thrust_and_inertia() {
         let flight = heavy();
@@ -148,6 +154,41 @@ mod tests {
         assert!((error - 0.08).abs() < 0.01, "{error}");
         let kept = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&mass), &[inertia]);
         assert!(kept.is_empty(), "predictions asked for the inertia: it stays");
+    }
+
+    /// The part of an effect with only its parameter number `at`.
+    fn part(whole: &Candidate, at: usize) -> Candidate {
+        Candidate { kind: whole.kind, free: vec![whole.free[at]] }
+    }
+
+    #[test]
+    fn an_exchange_closes_the_accepted_parts_of_an_effect_and_no_others() {
+        let flight = heavy();
+        let problem = problem(&flight);
+        let [thrust, weak, mass] =
+            ["thrust-scale", "weak-rotor", "mass-error"].map(|effect| candidate(&problem, effect));
+        let accepted = [thrust.clone(), part(&weak, 0)];
+        let base = problem.fitted(&problem.model.parameters.baseline(), &free_parameters(&accepted));
+        let found = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&mass), &[]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let is_closed = |candidate: &Candidate| found[0].closes(candidate);
+        assert!(is_closed(&thrust) && is_closed(&part(&weak, 0)));
+        assert!(!is_closed(&part(&weak, 1)) && !is_closed(&mass));
+    }
+
+    /// Four rotors that are weak alike have less thrust.
+    #[test]
+    fn an_effect_takes_the_place_of_its_accepted_parts() {
+        let flight = heavy();
+        let problem = problem(&flight);
+        let [thrust, inertia, weak] =
+            ["thrust-scale", "inertia-error", "weak-rotor"].map(|effect| candidate(&problem, effect));
+        let accepted = [part(&weak, 0), thrust, inertia];
+        let base = problem.fitted(&problem.model.parameters.baseline(), &free_parameters(&accepted));
+        let found = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&weak), &[]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].accepted, [weak.clone()]);
+        assert_eq!(found[0].fitted.free, weak.free, "no parameter twice");
     }
 
     #[test]

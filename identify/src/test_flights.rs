@@ -1,13 +1,43 @@
-//! Flights for unit tests: a Hummingbird whose rotors turn at hover, and that moves as the test says.
+//! Flights for unit tests: a Hummingbird whose rotors turn at hover, and that moves as the test says; and simulated ones.
 
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
-use flights::{Channel, Flight, Role};
+use crate::candidate::Candidate;
+use crate::fit::Problem;
+use crate::simulated::{Plan, fly, vehicle_file};
+use flights::{Channel, Flight, FlightSet, Role};
 use nalgebra::UnitQuaternion;
+use plant::effects::Effect;
 use vehicles::{ROTORS_MAX, Vehicle};
 
 /// The Hummingbird.
 pub fn hummingbird() -> Vehicle {
     Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap()
+}
+
+/// A Hummingbird whose rotors have hardly any inertia. Less thrust and less inertia about x and y equal more mass there.
+pub fn with_light_rotors() -> Vehicle {
+    Vehicle { rotor_inertia_kg_m2: 1e-9, ..hummingbird() }
+}
+
+/// A flight of `vehicle` to fit on and one to test on, simulated with `truth` beyond it.
+pub fn simulated(vehicle: &Vehicle, truth: &[Effect]) -> FlightSet {
+    let flown = |(seed, role): (u64, Role)| {
+        let mut plan = Plan { duration_s: 8.0, ..Plan::of(truth.to_vec(), seed) };
+        plan.sensors.pose_ticks = 10;
+        fly(vehicle, &plan, role)
+    };
+    FlightSet {
+        vehicle: vehicle_file("hummingbird.toml"),
+        flights: [(4_500, Role::Fit), (4_501, Role::Test)].map(flown).into(),
+        next_flight: Default::default(),
+        files: Default::default(),
+    }
+}
+
+/// The candidate of a whole effect.
+pub fn candidate(problem: &Problem, effect: &str) -> Candidate {
+    let free = problem.model.parameters.of_name(effect);
+    Candidate { kind: problem.model.parameters.all[free[0]].kind, free }
 }
 
 /// A flight of `duration_s`, logged every `period_s`: position in W (m) and Euler angles (rad) by time. Velocity and rates are
