@@ -20,7 +20,7 @@
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
 //! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
 //! | `logging` | timing errors that slowly logged commands make |
-//! | `select`, `judgement`, `revision`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, and their rivals |
+//! | `select`, `judgement`, `revision`, `simpler`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, one effect instead of two, and their rivals |
 //! | `ratios`, `instruments` | what flights determine that show rotation alone, and its fit by instrumental variables |
 //! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
 //! | [`proposal`] | the next flight, as reports hold it |

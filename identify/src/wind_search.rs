@@ -78,3 +78,107 @@ fn deviation(of: &[f64]) -> f64 {
     let squares: f64 = of.iter().map(|one| (one - mean) * (one - mean)).sum();
     (squares / (of.len().max(2) - 1) as f64).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidates;
+    use crate::model::Model;
+    use crate::parameter::Parameters;
+    use crate::prepared::{Prepared, Propulsion};
+    use crate::test_flights::{flown, hummingbird};
+    use crate::whitening::Noises;
+    use flights::Flight;
+
+    /// A level flight whose rotors turn at hover, so that the model lacks this constant acceleration. It sways beside that, as all others do.
+    fn accelerated(along_m_s2: [f64; 3]) -> Flight {
+        let sway_m = |t: f64| [0.2 * libm::sin(1.3 * t), 0.1 * libm::cos(1.9 * t), 2.0];
+        let position = |t: f64| std::array::from_fn(|axis| sway_m(t)[axis] + along_m_s2[axis] * t * t / 2.0);
+        flown([12.0, 0.01], position, |_| [0.0; 3])
+    }
+
+    /// Fit flights of a Hummingbird, of which each can show a wind of its own.
+    fn problem(flights: &[Flight]) -> Problem<'_> {
+        let vehicle = hummingbird();
+        let propulsion = Propulsion::of(&vehicle);
+        let prepared = |flight| Prepared::new(flight, None, &propulsion).expect("a usable flight");
+        let mut problem = Problem {
+            model: Model { parameters: Parameters::of(&vehicle, &[]), vehicle },
+            estimation: flights.iter().map(prepared).collect(),
+            validation: Vec::new(),
+            test: Vec::new(),
+            noises: Noises::new(),
+            block_s: 1.0,
+            shared_late_s: 0.0,
+        };
+        problem.number_flights();
+        problem
+    }
+
+    /// All candidates that the flights can show.
+    fn all_of(problem: &Problem) -> Vec<Candidate> {
+        let flights: Vec<&Prepared> = problem.flights().collect();
+        candidates(&problem.model.parameters, &flights).0
+    }
+
+    /// The spread of flights with these constant accelerations.
+    fn spread_m_s2(along_m_s2: &[[f64; 3]]) -> f64 {
+        let flights: Vec<Flight> = along_m_s2.iter().map(|along| accelerated(*along)).collect();
+        let problem = problem(&flights);
+        greatest_spread_m_s2(&problem, &problem.model.parameters.baseline())
+    }
+
+    #[test]
+    fn drags_lifts_and_one_thrust_scale_are_taken() {
+        let flights = [accelerated([0.0; 3]), accelerated([1.0, 0.0, 0.0])];
+        let problem = problem(&flights);
+        let all = all_of(&problem);
+        let is_there = |name: &str| all.iter().any(|candidate| candidate.kind.name == name);
+        let others = [
+            "blade-flapping",
+            "mass-error",
+            "weak-rotor",
+            "sensor-bias",
+            "sensor-delay",
+            "wind",
+            "flight-wind",
+        ];
+        assert!(others.into_iter().all(is_there), "each is a candidate: {all:?}");
+        let mut names: Vec<&str> =
+            all.iter().filter(|candidate| acts(candidate)).map(|candidate| candidate.kind.name).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["parasitic-drag", "rotor-drag", "thrust-scale", "translational-lift"]);
+    }
+
+    #[test]
+    fn the_deviation_is_that_of_a_sample() {
+        assert_eq!([deviation(&[]), deviation(&[3.0]), deviation(&[2.0, 2.0])], [0.0; 3]);
+        assert!((deviation(&[1.0, 3.0]) - 2.0_f64.sqrt()).abs() < 1e-12);
+        assert!((deviation(&[1.0, 2.0, 3.0]) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_spread_is_that_of_the_level_force_that_differs_most() {
+        let near = |found: f64, expected: f64| {
+            assert!((found - expected).abs() < 0.01, "{found}, expected {expected}");
+        };
+        near(spread_m_s2(&[[0.0, 0.2, 0.0], [1.0, 0.1, 0.0], [2.0, 0.0, 0.0]]), 1.0);
+        near(spread_m_s2(&[[0.1, 0.0, 0.0], [0.0, -2.0, 0.0]]), 2.0_f64.sqrt());
+        near(spread_m_s2(&[[1.0, 2.0, 0.0], [1.0, 2.0, 3.0]]), 0.0);
+        near(spread_m_s2(&[[1.0, 2.0, 0.0]]), 0.0);
+    }
+
+    /// One constant force of all flights may be one wind. Without the winds among the candidates there is nothing to search.
+    #[test]
+    fn flights_of_equal_mean_forces_have_no_several_winds() {
+        let flights = [(); 3].map(|()| accelerated([1.0, -0.5, 0.0]));
+        let mut problem = problem(&flights);
+        let all = all_of(&problem);
+        assert!(all.iter().any(|candidate| *candidate.kind == FLIGHT_WIND), "{all:?}");
+        let declared = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        assert!(several_winds(&mut problem, &declared, &all).is_none());
+        let others: Vec<Candidate> =
+            all.into_iter().filter(|candidate| *candidate.kind != FLIGHT_WIND).collect();
+        assert!(several_winds(&mut problem, &declared, &others).is_none());
+    }
+}
