@@ -524,12 +524,21 @@ fn promise(
 mod tests {
     use super::*;
     use crate::run::problem;
+    use crate::simpler::exchanges;
     use crate::simulated::effect;
     use crate::test_flights::{candidate, simulated, with_light_rotors};
     use plant::effects::Effect;
 
-    /// The selection among mass, thrust and inertia where the mass was taken and given up for the other two, and the problem's mass.
-    fn selected(truth: &[Effect]) -> (Selection, usize) {
+    /// The end of a search among mass, thrust and inertia, in which the mass was taken and then given up for the other two.
+    struct Found {
+        selection: Selection,
+        /// The error of the mass.
+        mass: f64,
+        /// True if the equations allow the mass instead of the two.
+        is_allowed: bool,
+    }
+
+    fn found(truth: &[Effect]) -> Found {
         let vehicle = with_light_rotors();
         let set = simulated(&vehicle, truth);
         let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
@@ -543,9 +552,18 @@ mod tests {
         let taken = judged(&problem, &declared, &mass, alone, FALSE_RATE);
         let accepted = vec![thrust, inertia];
         let base = problem.fitted(&declared.values, &free_parameters(&accepted));
+        let allowed = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&mass), &[]);
         let rounds = vec![Round { judged: vec![taken], taken: Some(0) }];
         let search = StepwiseSearch { accepted, rounds, base };
-        (search.finished(&mut problem, &candidates, &mut |_| ()), mass.free[0])
+        let selection = search.finished(&mut problem, &candidates, &mut |_| ());
+        let mass = selection.flown().values[mass.free[0]];
+        Found { selection, mass, is_allowed: !allowed.is_empty() }
+    }
+
+    /// The end where thrust and the inertia about x and y have these errors.
+    fn found_of([thrust, inertia]: [f64; 2]) -> Found {
+        let inertia = effect("inertia-error", &[("error_xx", inertia), ("error_yy", inertia)]);
+        found(&[effect("thrust-scale", &[("error", thrust)]), inertia])
     }
 
     fn names(selection: &Selection) -> Vec<&'static str> {
@@ -554,23 +572,34 @@ mod tests {
 
     #[test]
     fn a_mass_is_named_instead_of_the_thrust_and_the_inertia_that_stand_for_it() {
-        let (found, mass) = selected(&[effect("mass-error", &[("error", 0.2)])]);
-        assert_eq!(names(&found), ["mass-error"], "{:?}", found.withdrawn);
-        let error = found.flown().values[mass];
-        assert!((error - 0.2).abs() < 0.01, "{error}");
-        let replaced: Vec<_> = found.withdrawn.iter().map(|one| (one.effect, one.replaced_by)).collect();
+        let Found { selection, mass, is_allowed } = found(&[effect("mass-error", &[("error", 0.2)])]);
+        let withdrawn = &selection.withdrawn;
+        assert!(is_allowed);
+        assert_eq!(names(&selection), ["mass-error"], "{withdrawn:?}");
+        assert!((mass - 0.2).abs() < 0.01, "{mass}");
+        let replaced: Vec<_> = withdrawn.iter().map(|one| (one.effect, one.replaced_by)).collect();
         let by = Some("mass-error");
-        assert_eq!(replaced, [("inertia-error", by), ("thrust-scale", by)], "{:?}", found.withdrawn);
+        assert_eq!(replaced, [("inertia-error", by), ("thrust-scale", by)], "{withdrawn:?}");
         let reason = "mass-error alone predicts as well as inertia-error and thrust-scale together, with fewer parameters";
-        assert!(found.withdrawn.iter().all(|one| one.reason == reason), "{:?}", found.withdrawn);
+        assert!(withdrawn.iter().all(|one| one.reason == reason), "{withdrawn:?}");
     }
 
-    /// More mass would turn the vehicle by a third too fast.
+    fn require_both(selection: &Selection) {
+        assert_eq!(names(selection), ["thrust-scale", "inertia-error"], "{:?}", selection.withdrawn);
+        assert!(selection.withdrawn.is_empty(), "{:?}", selection.withdrawn);
+    }
+
+    /// More mass turns as the declared vehicle does, and this one turns by a quarter slower.
+    #[test]
+    fn thrust_and_inertia_stay_where_a_mass_is_far_from_both() {
+        require_both(&found_of([-0.1, 0.2]).selection);
+    }
+
+    /// It turns by a twentieth faster: too little for the equations, and enough for predictions.
     #[test]
     fn thrust_and_inertia_stay_where_a_mass_predicts_worse() {
-        let inertia = effect("inertia-error", &[("error_xx", 0.2), ("error_yy", 0.2)]);
-        let (found, _) = selected(&[effect("thrust-scale", &[("error", -0.1)]), inertia]);
-        assert_eq!(names(&found), ["thrust-scale", "inertia-error"], "{:?}", found.withdrawn);
-        assert!(found.withdrawn.is_empty(), "{:?}", found.withdrawn);
+        let Found { selection, is_allowed, .. } = found_of([-0.1, -0.14]);
+        assert!(is_allowed, "predictions have nothing to decide");
+        require_both(&selection);
     }
 }
