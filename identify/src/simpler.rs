@@ -80,7 +80,7 @@ fn exchange(
     old: [&'static str; 2],
     kept: &[Candidate],
 ) -> Option<Exchange> {
-    // Reports name effects: no effect is named instead of a part of itself.
+    // Reports name effects, not their parts: an effect would be named instead of itself.
     if old.contains(&new.kind.name) {
         return None;
     }
