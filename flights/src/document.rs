@@ -95,7 +95,7 @@ impl Document {
     /// of the flights file.
     pub fn resolve(&self, key: &str, written: &str, place: &Range<usize>) -> Result<PathBuf, FlightsError> {
         let expanded =
-            vehicles::variables::expand(written, |name| std::env::var(name).ok()).map_err(|found| {
+            inputs::variables::expand(written, |name| std::env::var(name).ok()).map_err(|found| {
                 let advice = "set the variable, or give a default: ${NAME:-path}";
                 self.bad(place, key, "a path", found.to_string(), advice)
             })?;

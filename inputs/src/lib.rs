@@ -12,6 +12,7 @@
 //! | `store` | files in a folder, named by their SHA-256 |
 //! | `read` | plain reading from the disk, with a limit |
 //! | `tidy` | paths without detours |
+//! | [`variables`] | variables of the environment within paths |
 //!
 //! ```
 //! let folder = tempfile::tempdir()?;
@@ -31,6 +32,7 @@ mod files;
 mod read;
 mod store;
 mod tidy;
+pub mod variables;
 
 pub use content::{sha256, sha256_of};
 pub use files::{InputFile, InputFiles};

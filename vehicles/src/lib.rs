@@ -21,7 +21,6 @@
 //! | [`lines`], [`encoding`] | lines of texts of any system; UTF-16 |
 //! | [`table`] | tables of measurements in CSV, for every log that has this format |
 //! | `table_rows` | their rows, in little memory |
-//! | [`variables`] | variables of the environment within paths |
 //! | [`wall_clock`] | times of day in logs |
 //! | [`mod@reference`] | the vehicle files of this crate, as text |
 //!
@@ -56,7 +55,6 @@ mod schedule;
 pub mod table;
 mod table_error;
 mod table_rows;
-pub mod variables;
 pub mod vehicle;
 pub mod wall_clock;
 

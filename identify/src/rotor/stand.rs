@@ -7,10 +7,10 @@ use diagnostics::unit::{Dimension, FORCE, RATIO, SPEED, TIME, TORQUE};
 use diagnostics::{Diagnostic, ParameterError};
 use flights::Role;
 use inputs::InputFiles;
+use inputs::variables::expand;
 use serde::Deserialize;
 use vehicles::Vehicle;
 use vehicles::table::Dialect;
-use vehicles::variables::expand;
 use vehicles::wall_clock;
 
 use super::error::RotorError;

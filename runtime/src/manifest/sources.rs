@@ -250,7 +250,7 @@ impl Sources {
 
     /// The text `written` with its variables replaced by those of the environment; `what` begins the fault of one that is not set.
     pub fn expand(&self, written: &Spanned<String>, what: &str) -> Result<String, Diagnostic> {
-        let expanded = vehicles::variables::expand(written.get_ref(), |name| std::env::var(name).ok());
+        let expanded = inputs::variables::expand(written.get_ref(), |name| std::env::var(name).ok());
         expanded.map_err(|message| {
             let message = format!("{what} {message}");
             self.problem(&written.span(), message, "set the variable, or give a default: ${NAME:-path}")

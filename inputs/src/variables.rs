@@ -19,9 +19,9 @@ pub enum VariableError {
 /// Replaces `${NAME}` and `${NAME:-default}` in `text` by the values of `variable`.
 ///
 /// ```
-/// let text = vehicles::variables::expand("${LOGS:-../logs}/a.csv", |_| None)?;
+/// let text = inputs::variables::expand("${LOGS:-../logs}/a.csv", |_| None)?;
 /// assert_eq!(text, "../logs/a.csv");
-/// # Ok::<(), vehicles::variables::VariableError>(())
+/// # Ok::<(), inputs::variables::VariableError>(())
 /// ```
 ///
 /// # Errors
