@@ -86,4 +86,14 @@ mod tests {
             }
         }
     }
+    /// A launcher reads there which further files a run needs.
+    #[test]
+    fn parameters_that_name_vehicles_and_scenes_declare_the_kind_of_the_file() {
+        for component in COMPONENTS.iter() {
+            for name in ["vehicle", "scene"] {
+                let is_declared = component.file(name).is_some();
+                assert_eq!(is_declared, component.has_parameter(name), "{}: {name}", component.name);
+            }
+        }
+    }
 }

@@ -1,5 +1,5 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
-//! function of the library has an error of another project in its signature.
+//! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -435,6 +435,23 @@ fn no_files_need_each_other() {
         }
     }
     assert!(found.is_empty(), "move types down, to where all who need them look:\n{found}");
+}
+
+/// Crates that know what flies, and where.
+const OF_A_DOMAIN: [&str; 8] =
+    ["autopilots", "controllers", "flights", "identify", "plant", "scenes", "sensors", "vehicles"];
+
+/// A launcher reads in the declarations of the components what it has to know of them.
+#[test]
+fn what_launches_and_records_knows_no_domain() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for crate_ in ["bus", "recorder", "runtime"] {
+        let text = fs::read_to_string(root.join(crate_).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = text.parse().unwrap();
+        let known = manifest["dependencies"].as_table().unwrap();
+        let found: Vec<_> = OF_A_DOMAIN.iter().filter(|name| known.contains_key(**name)).collect();
+        assert!(found.is_empty(), "{crate_} knows {found:?}: let the components declare it");
+    }
 }
 
 /// Crates whose public functions may return `anyhow::Error`: they are compiled only for the program and its tools.

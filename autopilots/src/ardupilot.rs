@@ -52,6 +52,7 @@ const CLOSED_PORTS: [u8; 7] = [0, 1, 2, 5, 6, 7, 8];
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// ArduCopter's program for SITL, relative to the manifest.
     firmware: PathBuf,

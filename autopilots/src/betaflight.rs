@@ -61,6 +61,7 @@ const ALLOWED: &str = "Allowed";
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Betaflight's program for SITL, relative to the manifest.
     firmware: PathBuf,

@@ -73,6 +73,7 @@ const ANSWER_MAX: usize = 1 << 16;
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// PX4's program for SITL, relative to the manifest.
     firmware: PathBuf,

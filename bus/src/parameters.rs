@@ -24,6 +24,7 @@
 //! ```
 
 use diagnostics::ParameterError;
+use inputs::FileKind;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -148,6 +149,8 @@ pub struct Parameter {
     pub entry: &'static str,
     /// Value in examples, as TOML; empty where there is none.
     pub example: &'static str,
+    /// Kind of the file whose path it is; `None` where it is no path, or nothing need be known of the file.
+    pub file: Option<FileKind>,
 }
 
 /// Value of a parameter that a manifest leaves out.
@@ -260,8 +263,24 @@ pub fn range_of(check: &dyn Fn(&str, f64) -> Result<(), ParameterError>) -> Stri
 mod tests {
     use super::{Parameters, range_of};
     use diagnostics::parameter::{finite, not_negative, positive};
+    use inputs::{FileKind, InputFiles};
     use serde_json::json;
     use std::collections::BTreeMap;
+    use std::path::{Path, PathBuf};
+
+    /// Lists of flights.
+    const LIST: FileKind = FileKind { others: |_, path| vec![path.with_extension("csv")] };
+
+    /// A table that names files.
+    #[derive(bus::Parameters)]
+    #[allow(dead_code, reason = "only the declarations are read")]
+    struct Named {
+        /// Flights.
+        #[parameter(shown = "none", file = LIST)]
+        flights: Option<PathBuf>,
+        /// Any file.
+        data: PathBuf,
+    }
 
     /// A table with all kinds of fields.
     #[derive(Debug, PartialEq, bus::Parameters)]
@@ -313,6 +332,14 @@ mod tests {
         assert_eq!((own.name, own.unit, own.default.text().as_str()), ("self", "1", "none"));
         assert_eq!((streams.default.text().as_str(), streams.table[0].name), ("none", "rate_hz"));
         assert_eq!((range_of(&finite).as_str(), range_of(&not_negative).as_str()), ("", "0 or more"));
+    }
+
+    #[test]
+    fn a_parameter_declares_the_kind_of_the_file_that_it_names() {
+        let [flights, data] = Named::DECLARED else { panic!("{:?}", Named::DECLARED) };
+        assert_eq!((flights.default.text().as_str(), data.file.is_none()), ("none", true));
+        let others = flights.file.map(|kind| (kind.others)(&InputFiles::default(), Path::new("a.txt")));
+        assert_eq!(others, Some(vec![PathBuf::from("a.csv")]));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
 use crate::state_transfer::StateLayout;
 use diagnostics::ParameterError;
-use inputs::InputFiles;
+use inputs::{FileKind, InputFiles};
 use serde_json::Value;
 use std::path::Path;
 
@@ -85,6 +85,12 @@ impl Registration {
     #[must_use]
     pub fn has_parameter(&self, name: &str) -> bool {
         self.parameters.iter().any(|parameter| parameter.name == name)
+    }
+
+    /// The kind of the file that its parameter called `name` names, as far as it declares one.
+    #[must_use]
+    pub fn file(&self, name: &str) -> Option<FileKind> {
+        self.parameters.iter().find(|parameter| parameter.name == name)?.file
     }
 
     /// As [`Component::period_ticks`]: at least one, and one of parameters that [`check`](Self::check) refuses.

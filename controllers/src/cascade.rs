@@ -34,6 +34,7 @@ const ATTITUDE_EVERY_MAX: f64 = 1000.0;
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/cascade.toml")]

@@ -77,6 +77,7 @@ pub struct LawContext<'a> {
 #[derive(Debug, bus::Parameters)]
 pub struct FileParameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     pub vehicle: PathBuf,
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the built-in gains")]

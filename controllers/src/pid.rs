@@ -54,6 +54,7 @@ pub struct PidState {
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains and limits: a table, or the path of a gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/pid.toml")]

@@ -241,6 +241,7 @@ impl VelocityLaw {
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/velocity.toml")]

@@ -103,6 +103,7 @@ enum Mode {
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/wall-follow-thesis.toml")]

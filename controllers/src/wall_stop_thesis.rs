@@ -91,6 +91,7 @@ pub struct WallStopThesisState {
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/wall-stop-thesis.toml")]

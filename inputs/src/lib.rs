@@ -8,6 +8,7 @@
 //! | room | content |
 //! |---|---|
 //! | `files` | [`InputFiles`]: the files of a run or a fit |
+//! | `kind` | [`FileKind`]: what is known of the files that a parameter names |
 //! | `content` | bytes with their SHA-256 |
 //! | `store` | files in a folder, named by their SHA-256 |
 //! | `read` | plain reading from the disk, with a limit |
@@ -29,6 +30,7 @@
 
 mod content;
 mod files;
+mod kind;
 mod read;
 mod store;
 mod tidy;
@@ -36,5 +38,6 @@ pub mod variables;
 
 pub use content::{sha256, sha256_of};
 pub use files::{InputFile, InputFiles};
+pub use kind::FileKind;
 pub use read::{TEXT_BYTES_MAX, read_bytes};
 pub use tidy::tidy;

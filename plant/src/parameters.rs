@@ -23,9 +23,10 @@ use vehicles::{EffectEntry, Vehicle};
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Scene file, relative to the manifest.
-    #[parameter(shown = "nothing but the ground")]
+    #[parameter(shown = "nothing but the ground", file = scenes::FILE)]
     scene: Option<PathBuf>,
     /// Physics that moves the vehicle: free flight, or the same forces in a scene.
     #[parameter(default = BackendName::default(), shown = "newton-euler", range = "`newton-euler`, `rapier`")]

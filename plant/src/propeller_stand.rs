@@ -27,6 +27,7 @@ const WORDS_PER_TICK: u128 = 1 << 10;
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Number of the vehicle's rotor on the stand, from 1.
     #[parameter(default = 1, range = "1 to the number of rotors")]

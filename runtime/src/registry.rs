@@ -3,7 +3,7 @@
 use bus::component::{Role, Transfer};
 use bus::parameters::Parameter;
 use bus::schema::Schema;
-use bus::{BusError, Registration};
+use bus::{BusError, FileKind, Registration};
 use std::collections::BTreeMap;
 
 /// The components that a manifest may name: the caller that checks or launches a manifest states them.
@@ -100,6 +100,21 @@ impl Registry {
     #[must_use]
     pub fn find(&self, name: &str) -> Option<&'static Registration> {
         self.iter().find(|component| component.name == name)
+    }
+
+    /// The kind of the file whose path a process states at `key`, as its `component` declares it; of a command, and of a component that does
+    /// not declare it, as another component does.
+    ///
+    /// ```
+    /// use bus::Registration;
+    /// use runtime::registry::Registry;
+    /// const COMPONENTS: Registry = Registry::new(&[Registration::of::<plant::node::Plant>()]);
+    /// assert!(COMPONENTS.file(None, "scene").is_some() && COMPONENTS.file(None, "data").is_none());
+    /// ```
+    #[must_use]
+    pub fn file(&self, component: Option<&Registration>, key: &str) -> Option<FileKind> {
+        let declared = component.and_then(|component| component.file(key));
+        declared.or_else(|| self.iter().find_map(|component| component.file(key)))
     }
 
     /// The names of all kinds that a manifest can use, for messages.

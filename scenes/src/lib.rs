@@ -44,7 +44,7 @@ mod triangles;
 
 pub use body::{BodyPose, FreeBody};
 pub use drive::{Drive, Mode, Target};
-pub use file::BODIES_MAX;
+pub use file::{BODIES_MAX, FILE};
 pub use joint::{Axis, End, Freedom, Joint};
 pub use mesh::{Mesh, Solidity};
 pub use ray::RayCaster;

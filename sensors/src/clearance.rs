@@ -24,7 +24,7 @@ const MIDDLE_M: f64 = 0.5;
 #[parameters(default)]
 pub struct Parameters {
     /// Scene file, relative to the manifest.
-    #[parameter(shown = "required")]
+    #[parameter(shown = "required", file = scenes::FILE)]
     pub scene: Option<PathBuf>,
     /// Distance from the wall that is to be kept.
     #[parameter(default = 3.0, check = not_negative)]

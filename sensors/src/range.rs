@@ -64,7 +64,7 @@ timed_parameters! {
     /// ```
     pub struct RangeParams timed { rate_hz: 10.0, delay_ms: 50.0 } {
         /// Scene file, relative to the manifest.
-        #[parameter(shown = "required")]
+        #[parameter(shown = "required", file = scenes::FILE)]
         pub scene: Option<PathBuf>,
         /// Standard deviation of a reading.
         #[parameter(default = 0.01, check = not_negative)]

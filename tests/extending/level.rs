@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
+    #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Bandwidth of the loops of height and attitude.
     #[parameter(check = positive)]

@@ -61,6 +61,6 @@ pub mod wall_clock;
 pub use command::CommandMap;
 pub use effects::EffectEntry;
 pub use envelope::Envelope;
-pub use file::is_rigid;
+pub use file::{FILE, is_rigid};
 pub use provenance::{Provenance, Stated, Uncertainty};
 pub use vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};

@@ -46,7 +46,7 @@ const UNITS: [(&str, &str); 32] = [
 
 /// Answer to an unknown key of `#[parameter(…)]`.
 const EXPECTED: &str =
-    "expected `rename`, `unit`, `default`, `shown`, `range`, `check`, `table`, `entry` or `example`";
+    "expected `rename`, `unit`, `default`, `shown`, `range`, `check`, `table`, `entry`, `example` or `file`";
 
 /// Stand-in for the number of a table in a list.
 const NUMBER: &str = "N";
@@ -72,6 +72,7 @@ struct Options {
     table: Option<Path>,
     entry: Option<LitStr>,
     example: Option<LitStr>,
+    file: Option<Expr>,
 }
 
 pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
@@ -229,6 +230,10 @@ impl<'f> Declared<'f> {
             .map_or_else(|| quote!(&[]), |table| quote!(<#table as ::bus::Parameters>::DECLARED));
         let [entry, example] = [&options.entry, &options.example]
             .map(|text| text.as_ref().map(LitStr::value).unwrap_or_default());
+        let file = match &options.file {
+            Some(kind) => quote!(::core::option::Option::Some(#kind)),
+            None => quote!(::core::option::Option::None),
+        };
         quote! {
             ::bus::parameters::Parameter {
                 name: #name,
@@ -239,6 +244,7 @@ impl<'f> Declared<'f> {
                 table: #table,
                 entry: #entry,
                 example: #example,
+                file: #file,
             }
         }
     }
@@ -272,7 +278,7 @@ impl Options {
         let mut options = Self::default();
         for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("parameter")) {
             attribute.parse_nested_meta(|meta| {
-                let Options { rename, unit, default, shown, range, check, table, entry, example } =
+                let Options { rename, unit, default, shown, range, check, table, entry, example, file } =
                     &mut options;
                 let texts = [
                     ("rename", rename),
@@ -292,6 +298,8 @@ impl Options {
                     *check = Some(meta.value()?.parse()?);
                 } else if is_named("table") {
                     *table = Some(meta.value()?.parse()?);
+                } else if is_named("file") {
+                    *file = Some(meta.value()?.parse()?);
                 } else {
                     return Err(meta.error(EXPECTED));
                 }

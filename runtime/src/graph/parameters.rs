@@ -9,12 +9,10 @@ use bus::context::{InputMessage, NodeContext, SampleTimes};
 use bus::plan::Plan;
 use diagnostics::{Diagnostic, ParameterError};
 use inputs::{InputFile, InputFiles};
-use scenes::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use vehicles::Vehicle;
 
 /// Key of the gains file's path in the parameter `gains`, whose other values replace those of the file.
 const FILE: &str = "file";
@@ -179,7 +177,7 @@ fn resolved<'a>(
             let over_file = over_file(declared, key, &path, stated).ok_or_else(|| has_two(declared, key))?;
             parameters.insert(key, over_file);
         }
-        let named = named_files(read, key, path.into());
+        let named = named_files(declared, read, key, path.into());
         if program.component().is_none() {
             read_named(read, key, &named).map_err(|message| {
                 let message = format!("process `{}`: {message}", name.get_ref());
@@ -317,13 +315,10 @@ fn has_two(declared: &DeclaredNode<'_>, key: &str) -> Diagnostic {
     declared.manifest.problem(&place(declared, key), message, help)
 }
 
-/// The file at `path`, the value of `key`, with the files that it names itself.
-fn named_files(files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
-    let others = match key {
-        "vehicle" => Vehicle::base(files, &path).into_iter().collect(),
-        "scene" => Scene::mesh_files(files, &path),
-        _ => Vec::new(),
-    };
+/// The file at `path`, the value of `key` of `declared`, with the files that it names itself.
+fn named_files(declared: &DeclaredNode<'_>, files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
+    let kind = declared.manifest.registry().file(declared.program.component(), key);
+    let others = kind.map_or(Vec::new(), |kind| (kind.others)(files, &path));
     std::iter::once(path).chain(others).collect()
 }
 
