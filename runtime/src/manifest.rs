@@ -323,7 +323,7 @@ impl Manifest {
         self.sources.expand(written, what)
     }
 
-    /// Path of the file `key`, which is `vehicle`, `scene` or `gains`, of the process `name`; `None` if it names none.
+    /// Path of the file `key`, such as `gains`, of the process `name`; `None` if it names none.
     #[must_use]
     pub fn file_path(&self, name: &str, key: &str) -> Option<PathBuf> {
         self.resolve(self.file_of(name, key)?).ok()
@@ -332,7 +332,7 @@ impl Manifest {
     /// The file `key` of the process `name`, as written.
     fn file_of(&self, name: &str, key: &str) -> Option<&Spanned<String>> {
         let (_, process) = self.content.process.iter().find(|(other, _)| other.get_ref() == name)?;
-        file_edits::file_of(process, key)
+        process.file(key)
     }
 
     /// The file at `path`, the value of `key` of the process `name`: where `--set` changes values in it, an edited copy that

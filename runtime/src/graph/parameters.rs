@@ -1,6 +1,6 @@
 //! Parameters: the values that each node reads about itself, checked by its kind.
 
-use super::processes::{DeclaredNode, files};
+use super::processes::DeclaredNode;
 use super::{placeholders, ranges};
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
@@ -164,8 +164,7 @@ fn resolved<'a>(
 ) -> Result<Resolved<'a>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let (mut parameters, mut edited, mut has_firmware) = (stated(declared)?, Vec::new(), false);
-    for (key, file) in files(process) {
-        let Some(file) = file else { continue };
+    for (key, file) in process.files() {
         has_firmware |= key == "firmware";
         let original = manifest.resolve(file)?;
         let copy = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
@@ -354,21 +353,18 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic
 /// A refused parameter, at its place.
 fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let (name, key) = (declared.name.get_ref(), error.key());
-    let file = files(declared.process).into_iter().find(|(file, _)| *file == key);
-    let has_two = file.is_some_and(|(_, file)| file.is_some())
+    let is_file = Process::file_keys().any(|file| file == key);
+    let has_two = declared.process.file(key).is_some()
         && declared.process.parameters.keys().any(|parameter| parameter.get_ref() == key);
     let help = match error {
         ParameterError::Missing { .. } if declared.is_backup() => {
-            let value =
-                if file.is_some() { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
+            let value = if is_file { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
             format!(
                 "add {value} to the keys of the backup; a backup of another kind keeps `inputs`, and `vehicle` and `scene` if that kind reads them, but \
                  neither `parameters` nor `gains`"
             )
         }
-        ParameterError::Missing { .. } if file.is_some() => {
-            format!("add {key} = \"PATH\" to [process.{name}]")
-        }
+        ParameterError::Missing { .. } if is_file => format!("add {key} = \"PATH\" to [process.{name}]"),
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
         ParameterError::Value { .. } if has_two => {
             format!(
@@ -441,7 +437,6 @@ fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
     }
     let first = key.split('.').next().unwrap_or(key);
     let parameter = declared.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
-    let file = files(declared.process).into_iter().find(|(key, _)| *key == first);
-    let file = file.and_then(|(_, file)| file.as_ref()).map(Spanned::span);
+    let file = declared.process.file(first).map(Spanned::span);
     parameter.or(file).unwrap_or_else(|| declared.name.span())
 }

@@ -111,19 +111,6 @@ fn require_no_sidecar(
     manifest.require(&process.on_exit, |on_exit| *on_exit != OnExit::Ignore, message, help)
 }
 
-/// The keys of a process that name a file which becomes a parameter.
-pub fn files(process: &Process) -> [(&'static str, &Option<Spanned<String>>); 7] {
-    [
-        ("vehicle", &process.vehicle),
-        ("scene", &process.scene),
-        ("gains", &process.gains),
-        ("data", &process.data),
-        ("fmu", &process.fmu),
-        ("firmware", &process.firmware),
-        ("configuration", &process.configuration),
-    ]
-}
-
 /// Program of `process`, with its settings.
 ///
 /// # Errors

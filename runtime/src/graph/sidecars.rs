@@ -1,6 +1,6 @@
 //! Sidecars: processes beside the ticks, and the order in which they start.
 
-use super::processes::{files, program, takes_part};
+use super::processes::{program, takes_part};
 use crate::manifest::{Manifest, Process};
 use crate::program::{OnExit, Program};
 use diagnostics::{Diagnostic, did_you_mean};
@@ -23,8 +23,8 @@ pub fn sidecars(manifest: &Manifest) -> Result<Vec<(String, Program)>, Diagnosti
 /// A sidecar has no ports, no place in the ticks, and no state of the run that a standby could go on from.
 fn require_no_node(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
     let who = format!("of `{}`, which has lockstep = false", name.get_ref());
-    let files = [("kind", &process.kind)].into_iter().chain(files(process));
-    let mut stated = files.map(|(key, file)| (key, file.as_ref().map(Spanned::span))).chain([
+    let kind = process.kind.iter().map(|kind| ("kind", kind));
+    let mut stated = kind.chain(process.files()).map(|(key, file)| (key, Some(file.span()))).chain([
         ("period_ticks", process.period_ticks.as_ref().map(Spanned::span)),
         ("cpu", process.cpu.as_ref().map(Spanned::span)),
         ("wait", process.wait.map(|_| name.span())),

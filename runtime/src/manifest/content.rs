@@ -197,6 +197,37 @@ pub struct Process {
     pub outputs: BTreeMap<Spanned<String>, OutputSetting>,
 }
 
+/// A field of a process that names a file.
+type FileField = fn(&Process) -> Option<&Spanned<String>>;
+
+/// Keys of a process that name a file, which becomes a parameter.
+static FILES: [(&str, FileField); 7] = [
+    ("vehicle", |process| process.vehicle.as_ref()),
+    ("scene", |process| process.scene.as_ref()),
+    ("gains", |process| process.gains.as_ref()),
+    ("data", |process| process.data.as_ref()),
+    ("fmu", |process| process.fmu.as_ref()),
+    ("firmware", |process| process.firmware.as_ref()),
+    ("configuration", |process| process.configuration.as_ref()),
+];
+
+impl Process {
+    /// The keys that name a file, which becomes a parameter.
+    pub fn file_keys() -> impl Iterator<Item = &'static str> {
+        FILES.iter().map(|(key, _)| *key)
+    }
+
+    /// The files that it names, by their keys.
+    pub fn files(&self) -> impl Iterator<Item = (&'static str, &Spanned<String>)> {
+        FILES.iter().filter_map(move |(key, field)| Some((*key, field(self)?)))
+    }
+
+    /// The file that it names at `key`.
+    pub fn file(&self, key: &str) -> Option<&Spanned<String>> {
+        self.files().find(|(name, _)| *name == key).map(|(_, file)| file)
+    }
+}
+
 /// The computing time of a process's steps, as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "distribution", rename_all = "kebab-case", deny_unknown_fields)]

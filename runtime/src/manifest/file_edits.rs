@@ -3,14 +3,13 @@
 //! The file on the disk is not changed. The process reads an edited copy under a path of its own beside the original.
 //! A controller of the same vehicle file still reads the original.
 
-use super::content::{Content, Process};
+use super::content::Content;
 use super::put::put;
 use super::sources::Sources;
 use diagnostics::{Diagnostic, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// Keys of a process whose value is a TOML file.
@@ -75,12 +74,6 @@ pub fn edited_files<'s>(overrides: impl Iterator<Item = &'s str>) -> Vec<(&'s st
         }
     }
     found
-}
-
-/// The written path of the file `key` of `process`.
-pub fn file_of<'p>(process: &'p Process, key: &str) -> Option<&'p Spanned<String>> {
-    let files = [("vehicle", &process.vehicle), ("scene", &process.scene), ("gains", &process.gains)];
-    files.into_iter().find(|(name, _)| *name == key)?.1.as_ref()
 }
 
 /// Values in files that are given with `--set`, in their order.
@@ -173,7 +166,7 @@ impl FileEdit {
             let help = format!("change them: process.{name}.parameters.{}.…", self.file);
             return Err(sources.problem(&self.span, message, help));
         }
-        if file_of(process, self.file).is_some() {
+        if process.file(self.file).is_some() {
             return Ok(());
         }
         let message = format!("process `{name}` names no {} file", self.file);

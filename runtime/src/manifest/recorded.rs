@@ -113,7 +113,7 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
 fn name_copies(document: &mut toml_edit::DocumentMut, sources: &Sources, processes: &Processes) {
     for (process, file) in file_edits::edited_files(sources.overrides().map(|source| source.text.as_str())) {
         let found = processes.iter().find(|(name, _)| name.get_ref() == process);
-        let Some(written) = found.and_then(|(_, found)| file_edits::file_of(found, file)) else { continue };
+        let Some(written) = found.and_then(|(_, found)| found.file(file)) else { continue };
         let copy = file_edits::edited_path(Path::new(written.get_ref()), process);
         let keys = ["process", process, file].map(str::to_owned);
         // It fails only if `process` is not a table, and then there is no process.

@@ -1,5 +1,6 @@
 //! Tables whose keys and values know their places, and how two of them become one.
 
+use super::content::Process;
 use diagnostics::Misread;
 use std::ops::Range;
 use toml::Spanned;
@@ -7,9 +8,8 @@ use toml::de::{DeString, DeTable, DeValue};
 
 /// Keys that identify a process: a new value for one of them removes the other.
 const IDENTITY: [&str; 2] = ["kind", "command"];
-/// Keys that have a meaning only together with those.
-const PARAMETERS: [&str; 9] =
-    ["computing_time", "configuration", "data", "firmware", "fmu", "gains", "parameters", "scene", "vehicle"];
+/// Keys that have a meaning only together with those, as the files of a process have.
+const PARAMETERS: [&str; 2] = ["computing_time", "parameters"];
 
 /// Table of `text`; its places start at `base`.
 ///
@@ -246,7 +246,8 @@ pub fn string<'v>(table: &'v DeTable<'_>, key: &str) -> Option<&'v str> {
 fn forget_identity(process: &mut DeTable<'_>, over: &DeTable<'_>) {
     let is_changed = |key: &str| over.contains_key(key) && !is_same(process.get(key), over.get(key));
     if IDENTITY.iter().any(|key| is_changed(key)) {
-        IDENTITY.iter().chain(&PARAMETERS).for_each(|key| drop(process.remove(*key)));
+        let keys = IDENTITY.into_iter().chain(PARAMETERS).chain(Process::file_keys());
+        keys.for_each(|key| drop(process.remove(key)));
     }
     forget_distribution(process, over);
 }
