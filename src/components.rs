@@ -69,6 +69,7 @@ pub(crate) fn effects() -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::COMPONENTS;
+    use bus::FileRole;
     use bus::component::Transfer;
 
     /// A checkpoint of a run refuses other values of them.
@@ -86,13 +87,20 @@ mod tests {
             }
         }
     }
-    /// A launcher reads there which further files a run needs.
+    /// A launcher reads there which further files a run needs, and which of them `--set` changes.
     #[test]
-    fn parameters_that_name_vehicles_and_scenes_declare_the_kind_of_the_file() {
+    fn parameters_that_name_files_declare_the_kind_of_the_file() {
+        let roles = [
+            ("vehicle", FileRole::Model),
+            ("scene", FileRole::Model),
+            ("gains", FileRole::Settings),
+            ("firmware", FileRole::Program),
+        ];
         for component in COMPONENTS.iter() {
-            for name in ["vehicle", "scene"] {
-                let is_declared = component.file(name).is_some();
-                assert_eq!(is_declared, component.has_parameter(name), "{}: {name}", component.name);
+            for (name, role) in roles {
+                let declared = component.file(name).map(|kind| kind.role);
+                let expected = component.has_parameter(name).then_some(role);
+                assert_eq!(declared, expected, "{}: {name}", component.name);
             }
         }
     }

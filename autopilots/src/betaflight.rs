@@ -64,6 +64,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Betaflight's program for SITL, relative to the manifest.
+    #[parameter(file = settings::FIRMWARE)]
     firmware: PathBuf,
     /// File of commands of its command line, which it runs before it flies, relative to the manifest.
     configuration: Option<PathBuf>,

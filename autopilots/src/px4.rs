@@ -76,6 +76,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// PX4's program for SITL, relative to the manifest.
+    #[parameter(file = settings::FIRMWARE)]
     firmware: PathBuf,
     /// File of its parameters, relative to the manifest.
     configuration: Option<PathBuf>,

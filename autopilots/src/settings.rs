@@ -1,12 +1,16 @@
 //! Parameters and files that firmwares have in common.
 
 use bus::context::NodeContext;
+use bus::{FileKind, FileRole};
 use controllers::airframe::ControlledVehicle;
 use diagnostics::ParameterError;
 use diagnostics::parameter::{positive_up_to, refuse};
 use std::path::Path;
 use std::time::Duration;
 use vehicles::{Rotor, Vehicle};
+
+/// Programs of firmwares, for parameters that name one.
+pub const FIRMWARE: FileKind = FileKind::of(FileRole::Program);
 
 /// First channel of a switch; those before are the sticks.
 const FIRST_SWITCH: usize = 5;

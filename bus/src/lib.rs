@@ -114,7 +114,7 @@ pub use error::BusError;
 pub use handles::{Input, Output};
 pub use harness::Harness;
 pub use input_messages::{InputMemory, InputMessages};
-pub use inputs::{FileKind, InputFiles};
+pub use inputs::{FileKind, FileRole, InputFiles};
 pub use join::{GENERATION_VARIABLE, Join, NODE_VARIABLE};
 pub use message::Message;
 #[doc(hidden)]

@@ -263,13 +263,14 @@ pub fn range_of(check: &dyn Fn(&str, f64) -> Result<(), ParameterError>) -> Stri
 mod tests {
     use super::{Parameters, range_of};
     use diagnostics::parameter::{finite, not_negative, positive};
-    use inputs::{FileKind, InputFiles};
+    use inputs::{FileKind, FileRole, InputFiles};
     use serde_json::json;
     use std::collections::BTreeMap;
     use std::path::{Path, PathBuf};
 
     /// Lists of flights.
-    const LIST: FileKind = FileKind { others: |_, path| vec![path.with_extension("csv")] };
+    const LIST: FileKind =
+        FileKind { others: |_, path| vec![path.with_extension("csv")], ..FileKind::of(FileRole::Settings) };
 
     /// A table that names files.
     #[derive(bus::Parameters)]

@@ -37,7 +37,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/cascade.toml")]
+    #[parameter(shown = "the gains of controllers/gains/cascade.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
     /// The command filter and the attitude loop compute on every n-th step, the rate loop and the altitude loop on each.
     #[parameter(default = 1, check = within(1.0..=ATTITUDE_EVERY_MAX, "1 to 1000 steps"))]

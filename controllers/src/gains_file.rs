@@ -8,13 +8,16 @@ use diagnostics::ParameterError;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, Dimension, SPEED};
 use diagnostics::{Diagnostic, Faults};
-use inputs::InputFiles;
+use inputs::{FileKind, FileRole, InputFiles};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_3, PI};
 use std::path::Path;
 use std::rc::Rc;
 use vehicles::reader::{Document, Quantity, Section};
+
+/// Gains files, for parameters that name one.
+pub(crate) const FILE: FileKind = FileKind::of(FileRole::Settings);
 
 /// Declares gains as `name: type = reading` for each field, where `reading` is of the [`Table`] that the head names; after
 /// `built in "FILE"` those of the file in `controllers/gains` are the default.

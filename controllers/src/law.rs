@@ -80,6 +80,6 @@ pub struct FileParameters {
     #[parameter(file = vehicles::FILE)]
     pub vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the built-in gains")]
+    #[parameter(shown = "the built-in gains", file = crate::gains_file::FILE)]
     pub gains: Option<PathBuf>,
 }

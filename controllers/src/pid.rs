@@ -57,7 +57,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains and limits: a table, or the path of a gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/pid.toml")]
+    #[parameter(shown = "the gains of controllers/gains/pid.toml", file = crate::gains_file::FILE)]
     gains: Option<Value>,
 }
 

@@ -244,7 +244,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/velocity.toml")]
+    #[parameter(shown = "the gains of controllers/gains/velocity.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
     /// Velocity along the heading's x and y, without the input `reference`.
     #[parameter(shown = "[0.0, 0.0]", check = finite)]

@@ -136,7 +136,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/wall-follow.toml")]
+    #[parameter(shown = "the gains of controllers/gains/wall-follow.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
     /// The speed shrinks with the distance to the wall ahead, or speed and distance are constant.
     #[parameter(range = "`varying`, `constant`", example = "\"varying\"")]

@@ -106,7 +106,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/wall-follow-thesis.toml")]
+    #[parameter(shown = "the gains of controllers/gains/wall-follow-thesis.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
     /// A tilt towards the wall ahead that falls with the distance to it, and no velocity across (Figs 5.36–5.45), or velocity commands
     /// that switch in steps with the states (Figs 5.46–5.54).

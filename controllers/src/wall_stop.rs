@@ -116,7 +116,7 @@ pub struct Parameters {
     #[parameter(file = vehicles::FILE)]
     vehicle: PathBuf,
     /// Gains file, relative to the manifest.
-    #[parameter(shown = "the gains of controllers/gains/wall-stop.toml")]
+    #[parameter(shown = "the gains of controllers/gains/wall-stop.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
     /// Height above what is below.
     #[parameter(check = positive, example = "1.0")]

@@ -38,6 +38,6 @@ pub mod variables;
 
 pub use content::{sha256, sha256_of};
 pub use files::{InputFile, InputFiles};
-pub use kind::FileKind;
+pub use kind::{FileKind, FileRole};
 pub use read::{TEXT_BYTES_MAX, read_bytes};
 pub use tidy::tidy;

@@ -80,7 +80,7 @@ pub struct Graph {
     pub backups: Vec<BackupSpec>,
     /// Sidecars: their names and programs.
     pub(crate) sidecars: Vec<(String, Program)>,
-    /// The vehicle, scene and gains files the processes name, each once.
+    /// The files that the processes name and those that belong to them, each once.
     pub(crate) models: Vec<PathBuf>,
     /// The files that the run reads, each read once.
     pub files: InputFiles,

@@ -3,7 +3,7 @@
 use bus::component::{Role, Transfer};
 use bus::parameters::Parameter;
 use bus::schema::Schema;
-use bus::{BusError, FileKind, Registration};
+use bus::{BusError, FileKind, FileRole, Registration};
 use std::collections::BTreeMap;
 
 /// The components that a manifest may name: the caller that checks or launches a manifest states them.
@@ -115,6 +115,12 @@ impl Registry {
     pub fn file(&self, component: Option<&Registration>, key: &str) -> Option<FileKind> {
         let declared = component.and_then(|component| component.file(key));
         declared.or_else(|| self.iter().find_map(|component| component.file(key)))
+    }
+
+    /// The role of the file whose path a process states at `key`, as the first component that has such a parameter declares it.
+    #[must_use]
+    pub fn file_role(&self, key: &str) -> Option<FileRole> {
+        self.file(None, key).map(|kind| kind.role)
     }
 
     /// The names of all kinds that a manifest can use, for messages.

@@ -12,14 +12,14 @@ use crate::triangles::Triangles;
 use diagnostics::parameter::Bounds;
 use diagnostics::unit::{ANGLE, LENGTH, RATIO};
 use diagnostics::{Diagnostic, Faults};
-use inputs::{FileKind, InputFiles};
+use inputs::{FileKind, FileRole, InputFiles};
 use nalgebra::{Rotation3, Vector3};
 use std::io::Result as IoResult;
 use std::path::{Path, PathBuf};
 use vehicles::reader::{Document, Section};
 
 /// Scene files, for parameters that name one.
-pub const FILE: FileKind = FileKind { others: Scene::mesh_files };
+pub const FILE: FileKind = FileKind { others: Scene::mesh_files, ..FileKind::of(FileRole::Model) };
 
 /// Lengths of a box.
 const SIZE: Bounds = Bounds {

@@ -16,12 +16,15 @@ use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
 use diagnostics::{Diagnostic, Faults};
-use inputs::{FileKind, InputFiles};
+use inputs::{FileKind, FileRole, InputFiles};
 use toml::de::DeTable;
 
 /// Vehicle files, for parameters that name one.
-pub const FILE: FileKind =
-    FileKind { others: |files, path| Vehicle::base(files, path).into_iter().collect() };
+pub const FILE: FileKind = FileKind {
+    others: |files, path| Vehicle::base(files, path).into_iter().collect(),
+    has_explaining_warnings: true,
+    ..FileKind::of(FileRole::Model)
+};
 
 /// Part of its size by which a published tensor may miss the triangle inequality through rounding.
 const TRIANGLE_SLACK: f64 = 1e-9;

@@ -4,9 +4,9 @@ use super::processes::DeclaredNode;
 use super::{placeholders, ranges};
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
-use bus::Registration;
 use bus::context::{InputMessage, NodeContext, SampleTimes};
 use bus::plan::Plan;
+use bus::{FileKind, FileRole, Registration};
 use diagnostics::{Diagnostic, ParameterError};
 use inputs::{InputFile, InputFiles};
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,21 +14,18 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// Key of the gains file's path in the parameter `gains`, whose other values replace those of the file.
+/// Key of the path of a file of settings in a table of parameters, whose other values replace those of the file.
 const FILE: &str = "file";
-
-/// Key of a vehicle file.
-const VEHICLE: &str = "vehicle";
 
 /// Notes taken while a manifest becomes a plan.
 #[derive(Debug, Default)]
 pub struct Notes {
-    /// The vehicle, scene and gains files that the processes name.
+    /// The files that the processes name, and those that belong to them.
     pub models: Vec<PathBuf>,
     /// Legal but unusual values.
     pub warnings: Vec<Diagnostic>,
-    /// Those about vehicles, which may explain why one is refused.
-    of_vehicles: Vec<Diagnostic>,
+    /// Those about files that may explain why such a file is refused, by the key of the file.
+    explaining: Vec<(String, Diagnostic)>,
     /// Times of the samples of each node's first process, by its name.
     pub times: BTreeMap<String, SampleTimes>,
     /// True if warnings were left out because the run was cut short.
@@ -45,10 +42,12 @@ impl Notes {
         is_cut
     }
 
-    /// A fault of processes; if a vehicle is refused, with the warnings about vehicles.
-    pub fn explain(&mut self, fault: Diagnostic) -> Diagnostic {
-        let is_of_vehicle = fault.all().any(|fault| fault.key() == VEHICLE);
-        if is_of_vehicle { fault.with_warnings(std::mem::take(&mut self.of_vehicles)) } else { fault }
+    /// A fault of processes; if it refuses a file, with the warnings that may explain it.
+    pub fn explain(&self, fault: Diagnostic) -> Diagnostic {
+        let refused: Vec<String> = fault.all().map(|fault| fault.key().to_owned()).collect();
+        let explaining = self.explaining.iter().filter(|(key, _)| refused.contains(key));
+        let warnings: Vec<Diagnostic> = explaining.map(|(_, warning)| warning.clone()).collect();
+        if warnings.is_empty() { fault } else { fault.with_warnings(warnings) }
     }
 
     /// The warnings, with one about everything that a run that was cut short leaves out.
@@ -69,8 +68,8 @@ impl Notes {
 }
 
 /// The parameters of `declared`, with resolved files, and the files that it reads. If its kind is built in, they are
-/// checked for a node that computes every `period_ticks` of the run of `plan`. Notes its vehicle file with that
-/// file's base, its scene and gains files, and unusual values.
+/// checked for a node that computes every `period_ticks` of the run of `plan`. Notes its files, with those that they
+/// name, and unusual values.
 ///
 /// # Errors
 /// A file or a parameter that is refused.
@@ -116,7 +115,7 @@ struct Edited<'k> {
 struct Resolved<'k> {
     parameters: BTreeMap<&'k str, serde_json::Value>,
     edited: Vec<Edited<'k>>,
-    has_firmware: bool,
+    has_program: bool,
 }
 
 fn checked(
@@ -146,8 +145,8 @@ fn checked(
             .given(&read);
         let checked = check_component(declared, kind, (&parameters, &resolved.edited), &context, scope);
         notes.times.entry(declared.name.get_ref().clone()).or_insert_with(|| context.times());
-        // A firmware has files beside its program.
-        if resolved.has_firmware {
+        // A program has files beside it.
+        if resolved.has_program {
             notes.models.extend(read.used().into_iter().map(|file| file.path));
         }
         note_warnings(declared, context, &resolved.edited, notes);
@@ -163,9 +162,9 @@ fn resolved<'a>(
     notes: &mut Notes,
 ) -> Result<Resolved<'a>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
-    let (mut parameters, mut edited, mut has_firmware) = (stated(declared)?, Vec::new(), false);
+    let (mut parameters, mut edited, mut has_program) = (stated(declared)?, Vec::new(), false);
     for (key, file) in process.files() {
-        has_firmware |= key == "firmware";
+        has_program |= file_kind(declared, key).is_some_and(|kind| kind.role == FileRole::Program);
         let original = manifest.resolve(file)?;
         let copy = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
         let path = copy.to_string_lossy().into_owned();
@@ -187,7 +186,7 @@ fn resolved<'a>(
             notes.models.extend(named);
         }
     }
-    Ok(Resolved { parameters, edited, has_firmware })
+    Ok(Resolved { parameters, edited, has_program })
 }
 
 /// Checks the `parameters` of `declared`, a component of `kind`, some of whose files are `edited` copies.
@@ -235,8 +234,8 @@ fn note_warnings(
             manifest.without_copy_in(declared.files, (name.get_ref(), key), (original, copy), &message)
         });
         let warning_at = problem(declared, &at, &message, String::new());
-        if warning.key == VEHICLE {
-            notes.of_vehicles.push(warning_at.clone());
+        if file_kind(declared, &warning.key).is_some_and(|kind| kind.has_explaining_warnings) {
+            notes.explaining.push((warning.key, warning_at.clone()));
         }
         notes.warnings.push(warning_at);
     }
@@ -289,7 +288,7 @@ fn beside(first: Result<(), Diagnostic>, second: Result<(), Diagnostic>) -> Resu
     Err(first.clone().and(more))
 }
 
-/// The parameter `gains` of a built-in controller that names the gains file at `path` and has the table `stated` in its parameters:
+/// The parameter `key` of a component that names the file of settings at `path` and has the table `stated` in its parameters:
 /// the values of the table replace those of the file. `None` if the two exclude each other.
 fn over_file(
     declared: &DeclaredNode<'_>,
@@ -299,7 +298,8 @@ fn over_file(
 ) -> Option<serde_json::Value> {
     declared.program.component()?;
     let serde_json::Value::Object(mut table) = stated else { return None };
-    if key != "gains" || table.contains_key(FILE) {
+    let has_settings = file_kind(declared, key).is_some_and(|kind| kind.role == FileRole::Settings);
+    if !has_settings || table.contains_key(FILE) {
         return None;
     }
     table.insert(FILE.to_owned(), path.into());
@@ -314,10 +314,14 @@ fn has_two(declared: &DeclaredNode<'_>, key: &str) -> Diagnostic {
     declared.manifest.problem(&place(declared, key), message, help)
 }
 
+/// The kind of the file `key` of `declared`, if it is declared.
+fn file_kind(declared: &DeclaredNode<'_>, key: &str) -> Option<FileKind> {
+    declared.manifest.registry().file(declared.program.component(), key)
+}
+
 /// The file at `path`, the value of `key` of `declared`, with the files that it names itself.
 fn named_files(declared: &DeclaredNode<'_>, files: &InputFiles, key: &str, path: PathBuf) -> Vec<PathBuf> {
-    let kind = declared.manifest.registry().file(declared.program.component(), key);
-    let others = kind.map_or(Vec::new(), |kind| (kind.others)(files, &path));
+    let others = file_kind(declared, key).map_or(Vec::new(), |kind| (kind.others)(files, &path));
     std::iter::once(path).chain(others).collect()
 }
 

@@ -2,6 +2,7 @@
 
 use super::sources::Sources;
 use super::tree;
+use bus::FileRole;
 use diagnostics::{Diagnostic, did_you_mean};
 use std::ops::Range;
 use toml::Spanned;
@@ -9,9 +10,6 @@ use toml::de::{DeTable, DeValue};
 
 /// Keys that a backup has in common with the process it succeeds.
 const FIXED: [&str; 5] = ["lockstep", "on_exit", "outputs", "period_ticks", "standby"];
-
-/// Files that describe what is flown and where, not how a kind works: a backup of another kind keeps those that it reads.
-const MODELS: [&str; 2] = ["vehicle", "scene"];
 
 /// Makes every `with` of `[[swap]]` and `[[shadow]]`, and every `standby`, a whole process.
 ///
@@ -106,11 +104,11 @@ fn differing<'s>(
     let mut whole = process.clone();
     whole.remove("on_exit");
     whole.remove("standby");
-    // Values over a gains file are of that file: another one is taken as it is.
-    if with.get("gains").is_some()
-        && let Some(parameters) = tree::table_mut(&mut whole, "parameters")
-    {
-        parameters.remove("gains");
+    // Values over a file of settings are of that file: another one is taken as it is.
+    if let Some(parameters) = tree::table_mut(&mut whole, "parameters") {
+        let is_settings = |key: &str| sources.registry.file_role(key) == Some(FileRole::Settings);
+        let settings = tree::names(&with).filter(|key| is_settings(key));
+        settings.for_each(|key| drop(parameters.remove(key)));
     }
     succeed(&mut whole, with, sources);
     Ok(whole)
@@ -119,11 +117,13 @@ fn differing<'s>(
 /// Puts the keys of `with` in place of those of `process`. Another kind keeps none of the keys of a kind but the models that it
 /// reads.
 pub fn succeed<'s>(process: &mut DeTable<'s>, with: DeTable<'s>, sources: &Sources) {
-    let before =
-        MODELS.map(|model| process.get_key_value(model).map(|(key, value)| (key.clone(), value.clone())));
+    // They describe what is flown and where, not how a kind works.
+    let is_model = |key: &str| sources.registry.file_role(key) == Some(FileRole::Model);
+    let models = process.iter().filter(|(key, _)| is_model(key.get_ref()));
+    let before: Vec<_> = models.map(|(key, value)| (key.clone(), value.clone())).collect();
     tree::replace_keys(process, with);
     let kind = tree::string(process, "kind").and_then(|kind| sources.registry.find(kind));
-    for (key, value) in before.into_iter().flatten() {
+    for (key, value) in before {
         // A change of the kind has removed it: the new kind reads the same model, if it reads one.
         if kind.is_some_and(|kind| kind.has_parameter(key.get_ref())) {
             process.entry(key).or_insert(value);
