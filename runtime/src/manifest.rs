@@ -7,7 +7,7 @@
 //! - `tree`: tables with the places of their values, merged
 //! - `sets`: vehicles of process sets become processes
 //! - `replacement`: a backup's differences become a whole process
-//! - `file_edits`: values of vehicle, scene and gains files given with `--set`
+//! - `file_edits`: values of files of processes, given with `--set`
 //! - `finite`: no number is infinite or none
 //! - `composition`: which nodes share a process
 //! - `judging`: the process that judges a run that is not recorded
@@ -176,7 +176,7 @@ impl Manifest {
             let path = self.resolve(self.file_of(process, file)?).ok()?;
             self.with_edits(files, process, file, path).ok()
         };
-        Ok(file_edits::number(files, key, find).or_else(|| tree::number(tree, key)))
+        Ok(file_edits::number(files, key, self.registry(), find).or_else(|| tree::number(tree, key)))
     }
 
     /// The texts that a recording depends on: the manifest's own file, those that it includes, and the values of `--set` without those
@@ -468,7 +468,7 @@ fn whole_tree(sources: &Sources) -> Result<DeTable<'_>, Diagnostic> {
     let mut tree = include::merged(sources)?;
     let (late, early): (Vec<_>, Vec<_>) = overrides::all(sources)?
         .into_iter()
-        .filter(|change| !change.is_of_a_file())
+        .filter(|change| !change.is_of_a_file(sources.registry))
         .partition(overrides::Override::is_of_an_expanded_process);
     early.into_iter().try_for_each(|change| change.apply(&mut tree, sources))?;
     sets::expand(&mut tree, sources)?;

@@ -1,19 +1,20 @@
-//! Values of vehicle, scene and gains files that `--set` replaces: `--set process.plant.vehicle.body.mass=0.5`.
+//! Values of a process's files that `--set` replaces, such as `--set process.plant.vehicle.body.mass=0.5`: of those files that
+//! components declare as models or settings.
 //!
 //! The file on the disk is not changed. The process reads an edited copy under a path of its own beside the original.
 //! A controller of the same vehicle file still reads the original.
 
-use super::content::Content;
+use super::content::{Content, Process};
 use super::put::put;
-use super::sources::Sources;
+use super::sources::{Source, Sources};
+use crate::registry::Registry;
+use bus::FileRole;
 use diagnostics::{Diagnostic, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
-/// Keys of a process whose value is a TOML file.
-const FILES: [&str; 3] = ["vehicle", "scene", "gains"];
 /// Key of the list of effects in a vehicle or scene file.
 const EFFECTS: &str = "effects";
 /// Key of the number or the vector in a quantity of a vehicle file.
@@ -23,8 +24,8 @@ const VALUE: &str = "value";
 #[derive(Clone, Debug)]
 pub struct FileEdit {
     process: String,
-    /// Key of the file: one of [`FILES`].
-    file: &'static str,
+    /// Key of the file.
+    file: String,
     /// Keys in the file, such as `body`, `mass`.
     keys: Vec<String>,
     value: Value,
@@ -32,11 +33,12 @@ pub struct FileEdit {
     span: Range<usize>,
 }
 
-/// The process, the key of the file, and the keys in it, where `keys` lead into a file.
-pub fn split<'k, 's>(keys: &'k [&'s str]) -> Option<(&'s str, &'static str, &'k [&'s str])> {
+/// The process, the key of the file, and the keys in it, where `keys` lead into a file that is TOML to the components of `registry`.
+pub fn split<'k, 's>(keys: &'k [&'s str], registry: Registry) -> Option<(&'s str, &'s str, &'k [&'s str])> {
     let ["process", process, file, rest @ ..] = keys else { return None };
-    let file = FILES.iter().find(|known| *known == file)?;
-    (!rest.is_empty()).then_some((*process, *file, rest))
+    let is_file = Process::file_keys().any(|key| key == *file);
+    let is_toml = is_file && registry.file_role(file).is_some_and(FileRole::is_toml);
+    (is_toml && !rest.is_empty()).then_some((*process, *file, rest))
 }
 
 /// Path of the edited copy of a file: `hummingbird.toml` of `h1/plant` becomes `hummingbird@h1@plant.toml`.
@@ -63,11 +65,14 @@ pub fn renamed(text: &str, copy: &str, mut name: impl FnMut(Option<usize>, &str)
 }
 
 /// The processes and keys of files that `overrides` edit, each once.
-pub fn edited_files<'s>(overrides: impl Iterator<Item = &'s str>) -> Vec<(&'s str, &'static str)> {
+pub fn edited_files<'s>(
+    overrides: impl Iterator<Item = &'s str>,
+    registry: Registry,
+) -> Vec<(&'s str, &'s str)> {
     let mut found = Vec::new();
     for text in overrides {
         let keys: Vec<&str> = text.split('=').next().unwrap_or_default().split('.').map(str::trim).collect();
-        if let Some((process, file, _)) = split(&keys)
+        if let Some((process, file, _)) = split(&keys, registry)
             && !found.contains(&(process, file))
         {
             found.push((process, file));
@@ -81,7 +86,8 @@ pub fn edited_files<'s>(overrides: impl Iterator<Item = &'s str>) -> Vec<(&'s st
 /// # Errors
 /// If there is no such process, or it does not name such a file.
 pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagnostic> {
-    let edits = sources.overrides().filter_map(|source| FileEdit::parse(&source.text, source.base));
+    let parse = |source: &Source| FileEdit::parse(&source.text, source.base, sources.registry);
+    let edits = sources.overrides().filter_map(parse);
     let require = |edit: FileEdit| edit.require_file(sources, content).map(|()| edit);
     edits.map(require).collect()
 }
@@ -108,14 +114,14 @@ pub fn edited<'e>(
 
 impl FileEdit {
     /// The edit in the text of a `--set`, if it leads into a file.
-    fn parse(text: &str, base: usize) -> Option<Self> {
+    fn parse(text: &str, base: usize, registry: Registry) -> Option<Self> {
         let (path, value) = text.split_once('=')?;
         let keys: Vec<&str> = path.split('.').map(str::trim).collect();
-        let (process, file, keys) = split(&keys)?;
+        let (process, file, keys) = split(&keys, registry)?;
         let value = value.trim();
         Some(Self {
             process: process.to_owned(),
-            file,
+            file: file.to_owned(),
             keys: keys.iter().map(|key| (*key).to_owned()).collect(),
             value: value.parse().unwrap_or_else(|_| value.into()),
             span: base..base + path.len(),
@@ -157,7 +163,7 @@ impl FileEdit {
             let help = did_you_mean(name, known, "the processes are");
             return Err(sources.problem(&self.span, format!("there is no process `{name}`"), help));
         };
-        let is_over_file = process.parameters.keys().any(|parameter| parameter.get_ref() == self.file);
+        let is_over_file = process.parameters.keys().any(|parameter| *parameter.get_ref() == self.file);
         if is_over_file {
             let message = format!(
                 "process `{name}` has values of its own for `{}`, which come before the file's",
@@ -166,11 +172,11 @@ impl FileEdit {
             let help = format!("change them: process.{name}.parameters.{}.…", self.file);
             return Err(sources.problem(&self.span, message, help));
         }
-        if process.file(self.file).is_some() {
+        if process.file(&self.file).is_some() {
             return Ok(());
         }
         let message = format!("process `{name}` names no {} file", self.file);
-        let file = self.file;
+        let file = &self.file;
         let help = format!(
             "add {file} = \"PATH\" to [process.{name}], or give --set process.{name}.{file}=PATH, too"
         );
@@ -284,10 +290,11 @@ impl FileEdit {
 pub fn number(
     files: &InputFiles,
     key: &str,
+    registry: Registry,
     find: impl FnOnce(&str, &str) -> Option<PathBuf>,
 ) -> Option<f64> {
-    let edit = FileEdit::parse(&format!("{key}=0"), 0)?;
-    let path = find(&edit.process, edit.file)?;
+    let edit = FileEdit::parse(&format!("{key}=0"), 0, registry)?;
+    let path = find(&edit.process, &edit.file)?;
     edit.number_in(&files.text(&path).ok()?, &|base| base_text(files, &path, base))
 }
 
@@ -331,34 +338,45 @@ fn index_of(list: &Item, name: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{FileEdit, edited, edited_files, edited_path};
+    use crate::registry::Registry;
+    use bus::Registration;
+    use controllers::controller::Controller;
+    use controllers::pid::PidLaw;
     use inputs::InputFiles;
     use std::path::Path;
+
+    /// A plant and its controller, whose files are edited.
+    const COMPONENTS: Registry =
+        Registry::new(&[Registration::of::<plant::node::Plant>(), Registration::of::<Controller<PidLaw>>()]);
 
     const VEHICLE: &str = "[body]\nmass = { value = 0.48, unit = \"kg\" } # weighed\n[[rotors]]\nname = \"front\"\n\
                            position = { value = [0.17, 0, 0], unit = \"m\" }\n";
 
+    fn edit(set: &str) -> FileEdit {
+        FileEdit::parse(set, 0, COMPONENTS).unwrap()
+    }
+
     fn changed(set: &str) -> Result<String, String> {
-        let edit = FileEdit::parse(set, 0).unwrap();
-        edited(VEHICLE, &[&edit], &["wind", "gusts"], &|_| None).map_err(|(_, message)| message)
+        edited(VEHICLE, &[&edit(set)], &["wind", "gusts"], &|_| None).map_err(|(_, message)| message)
     }
 
     #[test]
     fn a_table_of_the_base_is_taken_over_whole() {
-        let edit = FileEdit::parse("process.plant.vehicle.body.mass=0.5", 0).unwrap();
+        let mass = edit("process.plant.vehicle.body.mass=0.5");
         let base = |path: &str| {
             (path == "b.toml").then(|| "[body]\nmass = { value = 1, unit = \"kg\" }\nlength = 2\n".into())
         };
-        let found = edited("base = \"b.toml\"\n", &[&edit], &[], &base).unwrap();
+        let found = edited("base = \"b.toml\"\n", &[&mass], &[], &base).unwrap();
         assert_eq!(found, "base = \"b.toml\"\n[body]\nmass = { value = 0.5, unit = \"kg\" }\nlength = 2\n");
     }
 
     #[test]
     fn a_fault_of_a_value_is_about_its_edit_and_one_of_its_unit_is_not() {
-        let edit = FileEdit::parse("process.plant.vehicle.body.mass=heavy", 0).unwrap();
-        let is_about = |key: &str| edit.is_about(key, VEHICLE);
+        let mass = edit("process.plant.vehicle.body.mass=heavy");
+        let is_about = |key: &str| mass.is_about(key, VEHICLE);
         assert!(is_about("body.mass") && is_about("body.mass.value"));
         assert!(!is_about("body.mass.unit") && !is_about("body.length") && !is_about(""));
-        let unit = FileEdit::parse("process.plant.vehicle.body.mass.unit=lb", 0).unwrap();
+        let unit = edit("process.plant.vehicle.body.mass.unit=lb");
         assert!(unit.is_about("body.mass.unit", VEHICLE) && !unit.is_about("body.mass.value", VEHICLE));
     }
 
@@ -397,12 +415,15 @@ mod tests {
     fn the_number_at_a_key_is_found() {
         let files = InputFiles::default();
         files.keep("/v.toml".as_ref(), VEHICLE.into());
-        let number = |key: &str| super::number(&files, key, |_, _| Some("/v.toml".into()));
+        let number = |key: &str| super::number(&files, key, COMPONENTS, |_, _| Some("/v.toml".into()));
         assert_eq!(number("process.plant.vehicle.body.mass"), Some(0.48));
         assert_eq!(number("process.plant.vehicle.rotors.front.position.0"), Some(0.17));
         assert_eq!(number("process.plant.vehicle.rotors.front.position.1"), Some(0.0));
         assert_eq!(number("process.plant.vehicle.body.name"), None);
         assert_eq!(number("run.seed"), None);
+        let mass = "process.plant.vehicle.body.mass";
+        let undeclared = super::number(&files, mass, Registry::default(), |_, _| Some("/v.toml".into()));
+        assert_eq!(undeclared, None);
     }
 
     #[test]
@@ -426,7 +447,6 @@ mod tests {
         let message = changed("process.plant.vehicle.effects.lightning.x=3").unwrap_err();
         assert!(message.ends_with("`hummingbus effects` lists all effects"), "{message}");
         let text = format!("{VEHICLE}[[effects]]\nname = \"wind\"\nx = {{ value = 0, unit = \"m/s\" }}\n");
-        let edit = |set| FileEdit::parse(set, 0).unwrap();
         let set = edit("process.plant.vehicle.effects.wind.x=3");
         assert_eq!(edited(&text, &[&set], &[], &|_| None).unwrap(), text.replace("value = 0,", "value = 3,"));
         let gust = edit("process.plant.vehicle.effects.gust.x=3");
@@ -438,7 +458,7 @@ mod tests {
     fn an_effect_with_a_unit_is_added_and_its_next_parameter_joins_it() {
         let set = |key: &str| {
             let text = format!("process.plant.vehicle.effects.{key}={{ value = 3, unit = \"m/s\" }}");
-            FileEdit::parse(&text, 0).unwrap()
+            edit(&text)
         };
         let found = edited(VEHICLE, &[&set("wind.x"), &set("wind.y")], &[], &|_| None).unwrap();
         let effects = found.strip_prefix(VEHICLE).unwrap().trim_start();
@@ -453,6 +473,6 @@ mod tests {
         assert_eq!(found, Path::new("/a/b@h1@plant.toml"));
         let overrides =
             ["process.p.vehicle.a=1", "run.seed=3", "process.p.vehicle.b=1", "process.p.gains.c=1"];
-        assert_eq!(edited_files(overrides.into_iter()), [("p", "vehicle"), ("p", "gains")]);
+        assert_eq!(edited_files(overrides.into_iter(), COMPONENTS), [("p", "vehicle"), ("p", "gains")]);
     }
 }

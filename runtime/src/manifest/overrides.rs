@@ -4,6 +4,7 @@ use super::file_edits;
 use super::replacement;
 use super::sources::{Source, Sources};
 use super::tree;
+use crate::registry::Registry;
 use diagnostics::{Diagnostic, did_you_mean};
 use std::borrow::Cow;
 use toml::Spanned;
@@ -59,9 +60,9 @@ impl<'s> Override<'s> {
         matches!(self.names().as_slice(), ["process", _, "kind"])
     }
 
-    /// True if it changes a value in a file of a process: `file_edits`.
-    pub fn is_of_a_file(&self) -> bool {
-        file_edits::split(&self.names()).is_some()
+    /// True if it changes a value in a file of a process, as `file_edits` has it for the components of `registry`.
+    pub fn is_of_a_file(&self, registry: Registry) -> bool {
+        file_edits::split(&self.names(), registry).is_some()
     }
 
     /// The keys of the path.

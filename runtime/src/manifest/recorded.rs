@@ -6,6 +6,7 @@ use super::include;
 use super::put::put;
 use super::sources::Sources;
 use super::tree;
+use crate::registry::Registry;
 use diagnostics::Diagnostic;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -53,7 +54,7 @@ pub fn text(sources: &Sources, processes: &Processes) -> Result<String, Diagnost
     }
     let mut elsewhere = String::new();
     for text in simulated {
-        if is_of_a_file(text) || !set(&mut document, text, sources)? {
+        if is_of_a_file(text, sources.registry) || !set(&mut document, text, sources)? {
             // It changes another file, or a value in an included file or a set, which has no line of its own here.
             elsewhere += &format!("# --set {}\n", text.replace('\n', "\\n"));
         }
@@ -79,9 +80,9 @@ pub fn is_host_only(text: &str) -> bool {
 }
 
 /// True if an override leads into a file of a process.
-fn is_of_a_file(text: &str) -> bool {
+fn is_of_a_file(text: &str, registry: Registry) -> bool {
     let keys: Vec<&str> = text.split('=').next().unwrap_or_default().split('.').map(str::trim).collect();
-    file_edits::split(&keys).is_some()
+    file_edits::split(&keys, registry).is_some()
 }
 
 /// Writes an override into the text; false if its place is not in it.
@@ -111,7 +112,8 @@ fn set(document: &mut toml_edit::DocumentMut, text: &str, sources: &Sources) -> 
 /// Names the edited copies of files in the place of the originals. A process that has no line here, since an included file or
 /// a set declares it, gets one.
 fn name_copies(document: &mut toml_edit::DocumentMut, sources: &Sources, processes: &Processes) {
-    for (process, file) in file_edits::edited_files(sources.overrides().map(|source| source.text.as_str())) {
+    let overrides = sources.overrides().map(|source| source.text.as_str());
+    for (process, file) in file_edits::edited_files(overrides, sources.registry) {
         let found = processes.iter().find(|(name, _)| name.get_ref() == process);
         let Some(written) = found.and_then(|(_, found)| found.file(file)) else { continue };
         let copy = file_edits::edited_path(Path::new(written.get_ref()), process);
@@ -126,9 +128,14 @@ mod tests {
     use super::super::sources::{Origin, Sources};
     use super::super::{repair, whole_tree};
     use super::{is_host_only, text};
+    use crate::registry::Registry;
+    use bus::Registration;
+
+    /// A plant, whose vehicle file is edited.
+    const COMPONENTS: Registry = Registry::new(&[Registration::of::<plant::node::Plant>()]);
 
     fn recorded(manifest: &str, overrides: &[&str]) -> String {
-        let mut sources = Sources::default();
+        let mut sources = Sources::of(COMPONENTS);
         sources.add(Origin::File("a.toml".into()), manifest.to_owned());
         sources.order.push(0);
         overrides.iter().for_each(|text| sources.add(Origin::Override, (*text).to_owned()));
