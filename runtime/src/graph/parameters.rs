@@ -4,6 +4,7 @@ use super::processes::DeclaredNode;
 use super::{placeholders, ranges};
 use crate::manifest::{InputSetting, Manifest, Process};
 use crate::program::Executable;
+use crate::registry::Registry;
 use bus::context::{InputMessage, NodeContext, SampleTimes};
 use bus::plan::Plan;
 use bus::{FileKind, FileRole, Registration};
@@ -363,10 +364,8 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let help = match error {
         ParameterError::Missing { .. } if declared.is_backup() => {
             let value = if is_file { format!("{key} = \"PATH\"") } else { format!("parameters.{key} = …") };
-            format!(
-                "add {value} to the keys of the backup; a backup of another kind keeps `inputs`, and `vehicle` and `scene` if that kind reads them, but \
-                 neither `parameters` nor `gains`"
-            )
+            let kept = kept_by_another_kind(declared.manifest.registry());
+            format!("add {value} to the keys of the backup; a backup of another kind keeps {kept}")
         }
         ParameterError::Missing { .. } if is_file => format!("add {key} = \"PATH\" to [process.{name}]"),
         ParameterError::Missing { .. } => format!("add {key} = … to [process.{name}.parameters]"),
@@ -384,6 +383,25 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
         error = with_start_of_path(error);
     }
     declared.manifest.problem(&at, error, help)
+}
+
+/// The keys that a backup of another kind keeps, and those that it does not, in words.
+fn kept_by_another_kind(registry: Registry) -> String {
+    let keys_of = |role: FileRole| -> Vec<String> {
+        let keys = Process::file_keys().filter(|key| registry.file_role(key) == Some(role));
+        keys.map(|key| format!("`{key}`")).collect()
+    };
+    let (models, settings) = (keys_of(FileRole::Model), keys_of(FileRole::Settings));
+    let models = match models.as_slice() {
+        [] => String::new(),
+        [one] => format!(" and, if that kind reads it, {one}"),
+        all => format!(", and {} if that kind reads them", all.join(" and ")),
+    };
+    let others = match settings.as_slice() {
+        [] => "not `parameters`".to_owned(),
+        all => format!("neither `parameters` nor {}", all.join(" nor ")),
+    };
+    format!("`inputs`{models}, but {others}")
 }
 
 /// The same error of a value of `--set`; the advice on a file that cannot be read names the folder at which its path starts.
@@ -443,4 +461,24 @@ fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
     let parameter = declared.process.parameters.keys().find(|key| key.get_ref() == first).map(Spanned::span);
     let file = declared.process.file(first).map(Spanned::span);
     parameter.or(file).unwrap_or_else(|| declared.name.span())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::kept_by_another_kind;
+    use crate::registry::Registry;
+    use bus::Registration;
+    use controllers::controller::Controller;
+    use controllers::pid::PidLaw;
+
+    /// A plant and its controller, which declare models and settings.
+    const COMPONENTS: Registry =
+        Registry::new(&[Registration::of::<plant::node::Plant>(), Registration::of::<Controller<PidLaw>>()]);
+
+    #[test]
+    fn a_backup_of_another_kind_keeps_the_files_that_are_declared_as_models() {
+        let declared = "`inputs`, and `vehicle` and `scene` if that kind reads them, but neither `parameters` nor `gains`";
+        assert_eq!(kept_by_another_kind(COMPONENTS), declared);
+        assert_eq!(kept_by_another_kind(Registry::default()), "`inputs`, but not `parameters`");
+    }
 }
