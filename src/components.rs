@@ -76,17 +76,17 @@ mod tests {
     #[test]
     fn parameters_that_count_at_the_start_alone_are_declared() {
         for component in COMPONENTS.iter() {
-            assert!(component.initial.iter().all(|name| component.has_parameter(name)), "{}", component.name);
             // The place of the estimate's origin is added in every step.
             let counts_later = |name: &str| name == "initial_level_position_m";
             let is_stateless = matches!(component.transfer, Transfer::Nothing);
             let names = component.parameters.iter().map(|parameter| parameter.name);
             let named = names.filter(|name| name.contains("initial") && !counts_later(name));
             for name in named.filter(|_| !is_stateless) {
-                assert!(component.initial.contains(&name), "{}: {name}", component.name);
+                assert!(component.is_initial(name), "{}: {name}", component.name);
             }
         }
     }
+
     /// A launcher reads there which further files a run needs, and which of them `--set` changes.
     #[test]
     fn parameters_that_name_files_declare_the_kind_of_the_file() {

@@ -31,7 +31,7 @@ const SET_POINT: &str = "hummingbus_msgs/msg/SetPoint";
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// Altitude until another one is requested; the angles are zero.
-    #[parameter(example = "1.0")]
+    #[parameter(example = "1.0", initial)]
     initial_altitude_m: f64,
     /// Lowest and highest altitude that can be requested.
     #[parameter(example = "[0.3, 3.0]")]
@@ -143,8 +143,7 @@ impl Component for Operator {
     const INFO: Info = Info::new(
         "operator",
         "set points of a person at the page of the run, or those of a recording of such a run",
-    )
-    .starting_with(&["initial_altitude_m"]);
+    );
     type Parameters = Parameters;
     type Inputs<'a> = ();
     type Outputs = Outputs;

@@ -187,8 +187,6 @@ pub struct Info {
     pub summary: &'static str,
     /// Its role in the run.
     pub role: Role,
-    /// Parameters that count at the start alone, since its state begins with them.
-    pub initial: &'static [&'static str],
     /// Reason why it cannot take the place of a component from whose state it does not go on, if it cannot.
     pub needs_state: Option<&'static str>,
     /// The first failure that a judge has seen, if it is one.
@@ -210,21 +208,7 @@ impl Info {
     /// A component that computes outputs.
     #[must_use]
     pub const fn new(name: &'static str, summary: &'static str) -> Self {
-        Self { name, summary, role: Role::Compute, initial: &[], needs_state: None, first_failure: None }
-    }
-
-    /// The same component, whose `parameters` count at the start alone. A run that goes on from a checkpoint refuses other
-    /// values of them.
-    ///
-    /// ```
-    /// use bus::component::Info;
-    ///
-    /// const TANK: Info = Info::new("tank", "drains").starting_with(&["initial_level_m"]);
-    /// assert_eq!(TANK.initial, ["initial_level_m"]);
-    /// ```
-    #[must_use]
-    pub const fn starting_with(self, parameters: &'static [&'static str]) -> Self {
-        Self { initial: parameters, ..self }
+        Self { name, summary, role: Role::Compute, needs_state: None, first_failure: None }
     }
 
     /// The same component, which takes the place of another one only if it goes on from its state; `reason` says why.

@@ -151,6 +151,8 @@ pub struct Parameter {
     pub example: &'static str,
     /// Kind of the file whose path it is; `None` where it is no path, or nothing need be known of the file.
     pub file: Option<FileKind>,
+    /// True if it counts at the start alone, since the state begins with it. A run that goes on from a checkpoint refuses other values.
+    pub is_initial: bool,
 }
 
 /// Value of a parameter that a manifest leaves out.
@@ -272,7 +274,7 @@ mod tests {
     const LIST: FileKind =
         FileKind { others: |_, path| vec![path.with_extension("csv")], ..FileKind::of(FileRole::Settings) };
 
-    /// A table that names files.
+    /// A table that names files, and has a value for the start.
     #[derive(bus::Parameters)]
     #[allow(dead_code, reason = "only the declarations are read")]
     struct Named {
@@ -281,6 +283,9 @@ mod tests {
         flights: Option<PathBuf>,
         /// Any file.
         data: PathBuf,
+        /// Height at the start.
+        #[parameter(default = 0.0, initial)]
+        height_m: f64,
     }
 
     /// A table with all kinds of fields.
@@ -336,11 +341,12 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_declares_the_kind_of_the_file_that_it_names() {
-        let [flights, data] = Named::DECLARED else { panic!("{:?}", Named::DECLARED) };
+    fn a_parameter_declares_the_kind_of_its_file_and_that_it_counts_at_the_start_alone() {
+        let [flights, data, height] = Named::DECLARED else { panic!("{:?}", Named::DECLARED) };
         assert_eq!((flights.default.text().as_str(), data.file.is_none()), ("none", true));
         let others = flights.file.map(|kind| (kind.others)(&InputFiles::default(), Path::new("a.txt")));
         assert_eq!(others, Some(vec![PathBuf::from("a.csv")]));
+        assert!(height.is_initial && !flights.is_initial);
     }
 
     #[test]

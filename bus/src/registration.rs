@@ -23,8 +23,6 @@ pub struct Registration {
     pub summary: &'static str,
     /// Its role in a run.
     pub role: Role,
-    /// Parameters that count at the start alone.
-    pub initial: &'static [&'static str],
     /// As [`Info::needs_state`].
     pub needs_state: Option<&'static str>,
     /// As [`Info::first_failure`].
@@ -51,12 +49,11 @@ impl Registration {
     /// The component `C`.
     #[must_use]
     pub const fn of<C: Component + 'static>() -> Self {
-        let Info { name, summary, role, initial, needs_state, first_failure } = C::INFO;
+        let Info { name, summary, role, needs_state, first_failure } = C::INFO;
         Self {
             name,
             summary,
             role,
-            initial,
             needs_state,
             first_failure,
             inputs: <C::Inputs<'static> as InputPorts<'static>>::DECLARED,
@@ -84,13 +81,23 @@ impl Registration {
     /// True if it has a parameter called `name`.
     #[must_use]
     pub fn has_parameter(&self, name: &str) -> bool {
-        self.parameters.iter().any(|parameter| parameter.name == name)
+        self.parameter(name).is_some()
+    }
+
+    /// True if its parameter called `name` counts at the start alone.
+    #[must_use]
+    pub fn is_initial(&self, name: &str) -> bool {
+        self.parameter(name).is_some_and(|parameter| parameter.is_initial)
+    }
+
+    fn parameter(&self, name: &str) -> Option<&'static Parameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
     /// The kind of the file that its parameter called `name` names, as far as it declares one.
     #[must_use]
     pub fn file(&self, name: &str) -> Option<FileKind> {
-        self.parameters.iter().find(|parameter| parameter.name == name)?.file
+        self.parameter(name)?.file
     }
 
     /// As [`Component::period_ticks`]: at least one, and one of parameters that [`check`](Self::check) refuses.

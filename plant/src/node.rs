@@ -58,7 +58,6 @@ const NO_STATE: &str = "it cannot take over from a plant of another backend, ano
 
 impl Component for Plant {
     const INFO: Info = Info::new("plant", "flies the vehicle of a vehicle file, freely or in a scene")
-        .starting_with(&["initial_position_m", "initial_velocity_m_s", "initial_yaw_deg"])
         .needing_state(NO_STATE);
     type Parameters = Parameters;
     type Inputs<'a> = Inputs<'a>;

@@ -32,13 +32,13 @@ pub struct Parameters {
     #[parameter(default = BackendName::default(), shown = "newton-euler", range = "`newton-euler`, `rapier`")]
     backend: BackendName,
     /// Centre of mass at tick 0, in the world.
-    #[parameter(default = [0.0; 3], check = finite)]
+    #[parameter(default = [0.0; 3], check = finite, initial)]
     initial_position_m: [f64; 3],
     /// Its velocity, in the world.
-    #[parameter(default = [0.0; 3], check = finite)]
+    #[parameter(default = [0.0; 3], check = finite, initial)]
     initial_velocity_m_s: [f64; 3],
     /// Heading at tick 0, counter-clockwise from the world's x.
-    #[parameter(default = 0.0, check = finite)]
+    #[parameter(default = 0.0, check = finite, initial)]
     initial_yaw_deg: f64,
     /// Integration steps per tick.
     ///

@@ -28,9 +28,8 @@ pub(crate) fn require_effective(before: &Manifest, now: &Manifest, tick: u32) ->
             continue;
         }
         let component = kinds[0].and_then(|kind| now.registry().find(kind));
-        let initial = component.map_or(&[][..], |component| component.initial);
         for (key, value) in &process.parameters {
-            let is_initial = initial.contains(&key.get_ref().as_str());
+            let is_initial = component.is_some_and(|component| component.is_initial(key.get_ref()));
             if is_initial && other.parameters.get(key) != Some(value) {
                 return refused(
                     &key.span(),

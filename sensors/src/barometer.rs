@@ -52,7 +52,7 @@ timed_parameters! {
         #[parameter(default = 1.2, check = not_negative)]
         pub noise_Pa: f64,
         /// The bias at the first reading.
-        #[parameter(default = 0.0, check = finite)]
+        #[parameter(default = 0.0, check = finite, initial)]
         pub initial_bias_Pa: f64,
         /// Random walk of the bias.
         #[parameter(default = 0.2, check = not_negative)]
@@ -72,8 +72,7 @@ sensor! {
 }
 
 impl Sensor for BarometerParams {
-    const INFO: Info = Info::new("barometer", "air pressure and altitude with noise, walking bias and delay")
-        .starting_with(&["initial_bias_Pa"]);
+    const INFO: Info = Info::new("barometer", "air pressure and altitude with noise, walking bias and delay");
     type Parameters = Self;
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;

@@ -57,7 +57,7 @@ timed_parameters! {
         #[parameter(default = 2.1, check = positive)]
         pub capacity_Ah: f64,
         /// The charge that is taken for granted at the first measurement.
-        #[parameter(default = 1.0, check = within(0.0..=1.0, "from 0 to 1"))]
+        #[parameter(default = 1.0, check = within(0.0..=1.0, "from 0 to 1"), initial)]
         pub initial_charge: f64,
     }
 }
@@ -90,8 +90,7 @@ impl Sensor for BatteryParams {
     const INFO: Info = Info::new(
         "battery",
         "battery monitor: voltage and current with noise, and the charge counted from it",
-    )
-    .starting_with(&["initial_charge"]);
+    );
     type Parameters = Self;
     type Inputs<'a> = BatteryInputs<'a>;
     type Outputs = Outputs;

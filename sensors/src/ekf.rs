@@ -56,18 +56,7 @@ impl Component for Ekf {
     const INFO: Info = Info::new(
         "ekf",
         "extended Kalman filter: the motion from an IMU, GPS or motion capture, barometer, magnetometer",
-    )
-    .starting_with(&[
-        "barometer_initial_bias_sigma_m",
-        "initial_position_m",
-        "initial_position_sigma_m",
-        "initial_velocity_sigma_m_s",
-        "initial_tilt_sigma_deg",
-        "initial_yaw_deg",
-        "initial_yaw_sigma_deg",
-        "initial_gyroscope_bias_sigma_rad_s",
-        "initial_accelerometer_bias_sigma_m_s2",
-    ]);
+    );
     type Parameters = EkfParams;
     type Inputs<'a> = EkfInputs<'a>;
     type Outputs = Outputs;

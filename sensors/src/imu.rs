@@ -138,8 +138,7 @@ pub struct ImuSensor {
 
 impl Component for ImuSensor {
     const INFO: Info =
-        Info::new("imu", "accelerometer and gyroscope: noise, walking bias, and the mechanics of the part")
-            .starting_with(&["accelerometer_initial_bias_m_s2", "gyroscope_initial_bias_rad_s"]);
+        Info::new("imu", "accelerometer and gyroscope: noise, walking bias, and the mechanics of the part");
     type Parameters = ImuParams;
     type Inputs<'a> = TruthInputs<'a>;
     type Outputs = Outputs;

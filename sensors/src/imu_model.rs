@@ -31,7 +31,7 @@ pub struct ImuParams {
     #[parameter(default = 3.0e-3, check = not_negative)]
     pub accelerometer_bias_walk_m_s3_sqrt_hz: f64,
     /// The accelerometer's bias at the first reading, body axes.
-    #[parameter(default = [0.0; 3], check = finite)]
+    #[parameter(default = [0.0; 3], check = finite, initial)]
     pub accelerometer_initial_bias_m_s2: [f64; 3],
     /// The accelerometer reads no more than this on any axis.
     #[parameter(default = 18.0 * diagnostics::unit::STANDARD_GRAVITY_M_S2, shown = "176.52 (18 g)", check = positive)]
@@ -43,7 +43,7 @@ pub struct ImuParams {
     #[parameter(default = 1.9393e-5, check = not_negative)]
     pub gyroscope_bias_walk_rad_s2_sqrt_hz: f64,
     /// The gyroscope's bias at the first reading, body axes.
-    #[parameter(default = [0.0; 3], check = finite)]
+    #[parameter(default = [0.0; 3], check = finite, initial)]
     pub gyroscope_initial_bias_rad_s: [f64; 3],
     /// The gyroscope reads no more than this on any axis.
     #[parameter(default = 1000.0_f64.to_radians(), shown = "17.453 (1000 °/s)", check = positive)]

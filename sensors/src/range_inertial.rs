@@ -26,13 +26,7 @@ impl Component for RangeInertial {
     const INFO: Info = Info::new(
         "range-inertial",
         "velocity, height and distances to walls from range finders, IMU and attitude",
-    )
-    .starting_with(&[
-        "initial_acceleration_bias_sigma_m_s2",
-        "initial_velocity_sigma_m_s",
-        "initial_height_m",
-        "start_in_room_m",
-    ]);
+    );
     type Parameters = RangeInertialParams;
     type Inputs<'a> = RangeInertialInputs<'a>;
     type Outputs = Outputs;

@@ -45,8 +45,8 @@ const UNITS: [(&str, &str); 32] = [
 ];
 
 /// Answer to an unknown key of `#[parameter(…)]`.
-const EXPECTED: &str =
-    "expected `rename`, `unit`, `default`, `shown`, `range`, `check`, `table`, `entry`, `example` or `file`";
+const EXPECTED: &str = "expected `rename`, `unit`, `default`, `shown`, `range`, `check`, `table`, `entry`, `example`, \
+                        `file` or `initial`";
 
 /// Stand-in for the number of a table in a list.
 const NUMBER: &str = "N";
@@ -73,6 +73,7 @@ struct Options {
     entry: Option<LitStr>,
     example: Option<LitStr>,
     file: Option<Expr>,
+    initial: bool,
 }
 
 pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
@@ -234,6 +235,7 @@ impl<'f> Declared<'f> {
             Some(kind) => quote!(::core::option::Option::Some(#kind)),
             None => quote!(::core::option::Option::None),
         };
+        let is_initial = options.initial;
         quote! {
             ::bus::parameters::Parameter {
                 name: #name,
@@ -245,6 +247,7 @@ impl<'f> Declared<'f> {
                 entry: #entry,
                 example: #example,
                 file: #file,
+                is_initial: #is_initial,
             }
         }
     }
@@ -278,8 +281,19 @@ impl Options {
         let mut options = Self::default();
         for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("parameter")) {
             attribute.parse_nested_meta(|meta| {
-                let Options { rename, unit, default, shown, range, check, table, entry, example, file } =
-                    &mut options;
+                let Options {
+                    rename,
+                    unit,
+                    default,
+                    shown,
+                    range,
+                    check,
+                    table,
+                    entry,
+                    example,
+                    file,
+                    initial,
+                } = &mut options;
                 let texts = [
                     ("rename", rename),
                     ("unit", unit),
@@ -300,6 +314,8 @@ impl Options {
                     *table = Some(meta.value()?.parse()?);
                 } else if is_named("file") {
                     *file = Some(meta.value()?.parse()?);
+                } else if is_named("initial") {
+                    *initial = true;
                 } else {
                     return Err(meta.error(EXPECTED));
                 }

@@ -48,7 +48,7 @@ pub struct EkfParams {
     #[parameter(default = 0.0167, check = not_negative)]
     pub barometer_bias_walk_m_sqrt_s: f64,
     /// Standard deviation of its bias at the start.
-    #[parameter(default = 1.0, check = not_negative)]
+    #[parameter(default = 1.0, check = not_negative, initial)]
     pub barometer_initial_bias_sigma_m: f64,
     /// Standard deviation of each axis of a magnetometer.
     #[parameter(default = 2.02e-7, check = positive)]
@@ -66,28 +66,28 @@ pub struct EkfParams {
     #[parameter(default = earth_field::DECLINATION_DEG, check = finite)]
     pub declination_deg: f64,
     /// The position at the start.
-    #[parameter(shown = "the first one measured", check = finite)]
+    #[parameter(shown = "the first one measured", check = finite, initial)]
     pub initial_position_m: Option<[f64; 3]>,
     /// Its standard deviation, where it is given.
-    #[parameter(default = 0.01, check = not_negative)]
+    #[parameter(default = 0.01, check = not_negative, initial)]
     pub initial_position_sigma_m: f64,
     /// Standard deviation of the velocity at the start, taken for zero unless GPS measures it.
-    #[parameter(default = 0.5, check = not_negative)]
+    #[parameter(default = 0.5, check = not_negative, initial)]
     pub initial_velocity_sigma_m_s: f64,
     /// Standard deviation of roll and pitch at the start, without motion capture.
-    #[parameter(default = 1.0, check = not_negative)]
+    #[parameter(default = 1.0, check = not_negative, initial)]
     pub initial_tilt_sigma_deg: f64,
     /// The yaw at the start.
-    #[parameter(shown = "that of motion capture, else of the magnetometer, else 0", check = finite)]
+    #[parameter(shown = "that of motion capture, else of the magnetometer, else 0", check = finite, initial)]
     pub initial_yaw_deg: Option<f64>,
     /// Its standard deviation, without motion capture.
-    #[parameter(default = 5.0, check = not_negative)]
+    #[parameter(default = 5.0, check = not_negative, initial)]
     pub initial_yaw_sigma_deg: f64,
     /// Standard deviation of the gyroscope's bias at the start.
-    #[parameter(default = 1.0e-3, check = not_negative)]
+    #[parameter(default = 1.0e-3, check = not_negative, initial)]
     pub initial_gyroscope_bias_sigma_rad_s: f64,
     /// Standard deviation of the accelerometer's bias at the start.
-    #[parameter(default = 0.02, check = not_negative)]
+    #[parameter(default = 0.02, check = not_negative, initial)]
     pub initial_accelerometer_bias_sigma_m_s2: f64,
     /// Greatest delay with which a measurement may arrive.
     #[parameter(default = 200.0, check = not_negative)]

@@ -65,10 +65,10 @@ pub struct RangeInertialParams {
     /// Standard deviation of the level acceleration's bias at the start.
     ///
     /// A tilt of 0.1°: tuned, no source.
-    #[parameter(default = 0.02, check = not_negative)]
+    #[parameter(default = 0.02, check = not_negative, initial)]
     pub initial_acceleration_bias_sigma_m_s2: f64,
     /// Standard deviation of the velocity at the start, which is taken for zero.
-    #[parameter(default = 0.01, check = not_negative)]
+    #[parameter(default = 0.01, check = not_negative, initial)]
     pub initial_velocity_sigma_m_s: f64,
     /// Standard deviation of a level velocity of the input `gps` along each axis.
     ///
@@ -79,7 +79,7 @@ pub struct RangeInertialParams {
     #[parameter(default = [0.0; 2], check = finite)]
     pub initial_level_position_m: [f64; 2],
     /// Height at the start.
-    #[parameter(default = 0.0, check = not_negative)]
+    #[parameter(default = 0.0, check = not_negative, initial)]
     pub initial_height_m: f64,
     /// Size of the room along the world's x and y, where it is shared with other vehicles: an echo that is not
     /// that of a wall then does not correct the velocity. Without it every object in sight is taken to
@@ -87,7 +87,7 @@ pub struct RangeInertialParams {
     #[parameter(shown = "everything in sight stands still")]
     pub room_m: Option<[f64; 2]>,
     /// With `room_m`: place at the start, from the walls at −x and −y.
-    #[parameter(shown = "required with `room_m`")]
+    #[parameter(shown = "required with `room_m`", initial)]
     pub start_in_room_m: Option<[f64; 2]>,
     /// Gravity (thesis §3.1).
     #[parameter(default = 9.81, check = positive)]
