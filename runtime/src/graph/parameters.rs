@@ -466,19 +466,81 @@ fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::kept_by_another_kind;
+    use crate::graph::Graph;
+    use crate::manifest::Manifest;
     use crate::registry::Registry;
-    use bus::Registration;
+    use bus::component::{Component, Info, StepError};
+    use bus::context::{NodeContext, StepContext};
+    use bus::messages::MotorCommand;
+    use bus::{FileKind, FileRole, ParameterError, Registration};
     use controllers::controller::Controller;
     use controllers::pid::PidLaw;
+    use inputs::InputFiles;
+    use std::path::PathBuf;
 
-    /// A plant and its controller, which declare models and settings.
-    const COMPONENTS: Registry =
-        Registry::new(&[Registration::of::<plant::node::Plant>(), Registration::of::<Controller<PidLaw>>()]);
+    /// Settings with a table beside them.
+    const SETTINGS: FileKind = FileKind {
+        others: |_, path| vec![path.with_file_name("table.csv")],
+        ..FileKind::of(FileRole::Settings)
+    };
+
+    #[derive(bus::Parameters)]
+    #[allow(dead_code, reason = "the launcher alone reads it")]
+    struct Parameters {
+        /// Settings.
+        #[parameter(file = SETTINGS)]
+        configuration: PathBuf,
+    }
+
+    #[derive(bus::OutputPorts)]
+    struct Outputs {
+        command: MotorCommand,
+    }
+
+    /// Sends zeros.
+    struct Source;
+    impl Component for Source {
+        const INFO: Info = Info::new("source", "sends zeros");
+        type Parameters = Parameters;
+        type Inputs<'a> = ();
+        type Outputs = Outputs;
+        type State = ();
+        fn new(_: Parameters, _: &NodeContext<'_>) -> Result<Self, ParameterError> {
+            Ok(Self)
+        }
+        fn initial(&self) {}
+        fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+            Ok(Outputs { command: MotorCommand::default() })
+        }
+    }
+
+    /// A plant and its controller, which declare models and settings, and a component with settings under another key.
+    const COMPONENTS: Registry = Registry::new(&[
+        Registration::of::<plant::node::Plant>(),
+        Registration::of::<Controller<PidLaw>>(),
+        Registration::of::<Source>(),
+    ]);
+
+    #[test]
+    fn a_file_is_treated_as_its_component_declares_it() {
+        let text = "[run]\nduration_s = 1.0\n[process.source]\nkind = \"source\"\nconfiguration = \"/flight/a.toml\"\n";
+        let models = |set: &[String]| {
+            let manifest =
+                Manifest::parse(text.to_owned(), "/flight/m.toml".as_ref(), set, COMPONENTS).unwrap();
+            let files = InputFiles::default();
+            files.keep("/flight/a.toml".as_ref(), b"gain = 1".to_vec());
+            Graph::build_from(&manifest, files).unwrap().models
+        };
+        assert_eq!(models(&[]), ["/flight/a.toml", "/flight/table.csv"].map(PathBuf::from));
+        let edited = models(&["process.source.configuration.gain=2".to_owned()]);
+        assert_eq!(edited, ["/flight/a@source.toml", "/flight/table.csv"].map(PathBuf::from));
+    }
 
     #[test]
     fn a_backup_of_another_kind_keeps_the_files_that_are_declared_as_models() {
         let declared = "`inputs`, and `vehicle` and `scene` if that kind reads them, but neither `parameters` nor `gains`";
-        assert_eq!(kept_by_another_kind(COMPONENTS), declared);
+        let registry = Registry::new(&COMPONENTS.components()[..2]);
+        assert_eq!(kept_by_another_kind(registry), declared);
         assert_eq!(kept_by_another_kind(Registry::default()), "`inputs`, but not `parameters`");
     }
 }
