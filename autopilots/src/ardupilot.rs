@@ -17,18 +17,19 @@ use crate::autopilot::{Autopilot, Sensed, Throttles};
 use crate::datagrams::{self, Datagrams};
 use crate::layout::Layout;
 use crate::origin::Origin;
+use crate::parameter_lines;
 use crate::process::Scratch;
 use crate::rest::Rest;
 use crate::settings;
 use bus::component::Info;
 use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use diagnostics::parameter::refuse;
+use diagnostics::parameter::{refuse, up_to};
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
 use remote_control::RemoteControl;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 use vehicles::Vehicle;
@@ -68,10 +69,10 @@ pub struct Parameters {
     ///
     /// The estimator (EKF3) aligns its attitude within 6 s, and uses its GPS from 41 s on (measured, ArduCopter 4.6.0-dev); the last 4 s
     /// are for arming.
-    #[parameter(default = 45.0)]
+    #[parameter(default = 45.0, check = up_to(settings::REST_MAX_S, "s"))]
     rest_s: f64,
     /// Host time that an answer may take.
-    #[parameter(default = settings::reply_timeout_s())]
+    #[parameter(default = settings::reply_timeout_s(), check = up_to(settings::REPLY_TIMEOUT_MAX_S, "s"))]
     reply_timeout_s: f64,
     /// Place on the earth of the world's origin.
     #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
@@ -124,30 +125,21 @@ impl Autopilot for ArduPilot {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, .. } = parameters;
-        let vehicle = settings::vehicle(context, &vehicle)?;
-        let refused = |reason: String| settings::refused_vehicle(&vehicle, &reason);
-        let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
-        let numbers = FrameNumbers::of(&layout).map_err(refused)?;
-        layout.warn_of_oddities(&vehicle, context);
-        let program = settings::program(context, &firmware, "ArduCopter's SITL, build/sitl/bin/arducopter")?;
-        settings::require_text(&program, &firmware, NAME, "it is not ArduCopter's SITL")?;
-        settings::check_arming(armed_by_channel, remote_control::CHANNELS)?;
-        settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
         let period_s = context.period_s();
-        refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
-            format!(
-                "the period is {period_s} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step"
-            )
-        })?;
-        let period_us = period_s * 1e6;
-        refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
-            format!(
-                "the period is {period_us} us, expected whole microseconds: ArduPilot's clock cuts each step to them"
-            )
-        })?;
-        let configured = settings::configuration(context, configuration.as_deref())?;
-        let text = parameter_file::text(&configured, &numbers, vehicle.rotors.len())
-            .map_err(|reason| ParameterError::conflict("configuration", reason))?;
+        let framed = framed(context, &vehicle);
+        let program = program(context, &firmware);
+        let configured = settings::configuration(context, configuration.as_deref());
+        let configured = configured.and_then(parameter_lines::checked);
+        let checks = ParameterError::gather([
+            settings::check_arming(armed_by_channel, remote_control::CHANNELS),
+            settings::check_rest(rest_s, ARMED_S, armed_by_channel),
+            check_period(period_s),
+        ]);
+        let rest = ParameterError::both(configured, checks);
+        let (framed, (program, (configured, _))) =
+            ParameterError::both(framed, ParameterError::both(program, rest))?;
+        let (vehicle, layout, numbers) = framed;
+        let text = parameter_file::text(&configured, &numbers, vehicle.rotors.len())?;
         Ok(Self {
             layout,
             vehicle,
@@ -155,7 +147,7 @@ impl Autopilot for ArduPilot {
             parameters: text,
             arguments: parameters.arguments,
             rest: Rest { time_s: rest_s, armed_s: ARMED_S, armed_by_channel, period_s },
-            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
+            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s),
             origin: parameters.origin,
         })
     }
@@ -203,6 +195,39 @@ impl Autopilot for ArduPilot {
         link.frame = outputs.frame;
         Ok(self.throttles(&outputs))
     }
+}
+
+/// The vehicle at `path` in a frame of the firmware. Warns of its oddities.
+fn framed(context: &NodeContext<'_>, path: &Path) -> Result<(Vehicle, Layout, FrameNumbers), ParameterError> {
+    let vehicle = settings::vehicle(context, path)?;
+    let refused = |reason: String| settings::refused_vehicle(&vehicle, &reason);
+    let layout = Layout::of(&vehicle.rotors, &FRAMES).map_err(refused)?;
+    let numbers = FrameNumbers::of(&layout).map_err(refused)?;
+    layout.warn_of_oddities(&vehicle, context);
+    Ok((vehicle, layout, numbers))
+}
+
+/// The program at `path`, which is ArduCopter's SITL.
+fn program(context: &NodeContext<'_>, path: &Path) -> Result<Vec<u8>, ParameterError> {
+    let program = settings::program(context, path, "ArduCopter's SITL, build/sitl/bin/arducopter")?;
+    settings::require_text(&program, path, NAME, "it is not ArduCopter's SITL")?;
+    Ok(program)
+}
+
+/// Refuses a period that is no step of the firmware's clock.
+fn check_period(period_s: f64) -> Result<(), ParameterError> {
+    let period_us = period_s * 1e6;
+    let is_short = refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
+        format!(
+            "the period is {period_s} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step"
+        )
+    });
+    let is_whole = refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
+        format!(
+            "the period is {period_us} us, expected whole microseconds: ArduPilot's clock cuts each step to them"
+        )
+    });
+    ParameterError::both(is_short, is_whole).map(drop)
 }
 
 impl ArduPilot {

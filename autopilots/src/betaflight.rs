@@ -20,9 +20,9 @@ use crate::stream::Stream;
 use bus::component::Info;
 use bus::context::NodeContext;
 use diagnostics::ParameterError;
-use diagnostics::parameter::positive;
+use diagnostics::parameter::{positive, up_to};
 use mixers::MIXERS;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use vehicles::Vehicle;
 
@@ -71,10 +71,10 @@ pub struct Parameters {
     /// Channel whose switch arms, counted from 1, where the firmware is to be armed at tick 0; none where the pilot arms.
     armed_by_channel: Option<usize>,
     /// Packets of the remote control a second, as receivers of serial protocols send at least.
-    #[parameter(default = 50.0)]
+    #[parameter(default = 50.0, check = positive)]
     rc_rate_hz: f64,
     /// Host time that an answer may take.
-    #[parameter(default = settings::reply_timeout_s())]
+    #[parameter(default = settings::reply_timeout_s(), check = up_to(settings::REPLY_TIMEOUT_MAX_S, "s"))]
     reply_timeout_s: f64,
     /// Place on the earth of the world's origin.
     #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
@@ -158,27 +158,24 @@ impl Autopilot for Betaflight {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, firmware, configuration, armed_by_channel, .. } = parameters;
-        let vehicle = settings::vehicle(context, &vehicle)?;
-        let layout = Layout::of(&vehicle.rotors, &MIXERS)
-            .map_err(|reason| settings::refused_vehicle(&vehicle, &reason))?;
-        layout.warn_of_oddities(&vehicle, context);
-        let program =
-            settings::preloadable(context, &firmware, "Betaflight's SITL, obj/main/betaflight_SITL.elf")?;
-        settings::require_text(&program, &firmware, NAME, "it is not Betaflight's SITL")?;
-        settings::require_text(&program, &firmware, CONFIGURE, WITHOUT_CONFIGURE)?;
-        positive("rc_rate_hz", parameters.rc_rate_hz)?;
-        settings::check_arming(armed_by_channel, CHANNELS)?;
+        let files = ParameterError::both(
+            program(context, &firmware),
+            settings::configuration(context, configuration.as_deref()),
+        );
+        let rest = ParameterError::both(files, settings::check_arming(armed_by_channel, CHANNELS));
+        let ((vehicle, layout), ((program, configured), ())) =
+            ParameterError::both(mixed(context, &vehicle), rest)?;
         Ok(Self {
             vehicle,
             layout,
             firmware: program,
             firmware_path: firmware,
-            configuration_path: configuration.clone().unwrap_or_default(),
-            configuration: settings::configuration(context, configuration.as_deref())?,
+            configuration_path: configuration.unwrap_or_default(),
+            configuration: configured,
             armed_by_channel,
             period_ns: context.tick_ns * u64::from(context.period_ticks),
             rc_ticks: steps(1.0 / parameters.rc_rate_hz, context.period_s()).max(1),
-            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
+            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s),
             origin: parameters.origin,
         })
     }
@@ -212,6 +209,23 @@ impl Autopilot for Betaflight {
         };
         throttles.map_err(|words| link.stream.firmware().complaint(&words))
     }
+}
+
+/// The vehicle at `path`, for which the firmware has a mixer. Warns of its oddities.
+fn mixed(context: &NodeContext<'_>, path: &Path) -> Result<(Vehicle, Layout), ParameterError> {
+    let vehicle = settings::vehicle(context, path)?;
+    let layout = Layout::of(&vehicle.rotors, &MIXERS)
+        .map_err(|reason| settings::refused_vehicle(&vehicle, &reason))?;
+    layout.warn_of_oddities(&vehicle, context);
+    Ok((vehicle, layout))
+}
+
+/// The program at `path`, which is Betaflight's SITL and can load a configuration.
+fn program(context: &NodeContext<'_>, path: &Path) -> Result<Vec<u8>, ParameterError> {
+    let program = settings::preloadable(context, path, "Betaflight's SITL, obj/main/betaflight_SITL.elf")?;
+    settings::require_text(&program, path, NAME, "it is not Betaflight's SITL")?;
+    settings::require_text(&program, path, CONFIGURE, WITHOUT_CONFIGURE)?;
+    Ok(program)
 }
 
 impl Betaflight {

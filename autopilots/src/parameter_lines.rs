@@ -1,20 +1,43 @@
 //! A file of a firmware's parameters: a name and a number a line.
 
+use diagnostics::ParameterError;
+
 /// Longest name, in ArduPilot (`AP_MAX_NAME_SIZE`) and in PX4.
 const NAME_LENGTH_MAX: usize = 16;
 /// Characters between a name and its value.
 const SEPARATORS: [char; 5] = [' ', ',', '=', '\t', '\r'];
+/// Faulty lines that are told: a file of another format has a fault in each line.
+const TOLD_MAX: usize = 20;
 
-/// Names and values of `text`, in its order.
+/// Names and values of `text`, the parameter `configuration`, in its order.
 ///
 /// # Errors
-/// A line is not a name and a number.
-pub fn read(text: &str) -> Result<Vec<(&str, &str)>, String> {
-    let mut read = Vec::new();
+/// The first lines that are not a name and a number.
+pub fn read(text: &str) -> Result<Vec<(&str, &str)>, ParameterError> {
+    let (mut passed, mut faulty) = (Vec::new(), Vec::new());
     for (at, line) in text.lines().enumerate() {
-        read.extend(read_line(line).map_err(|reason| format!("line {}: {reason}", at + 1))?);
+        match read_line(line) {
+            Ok(read) => passed.extend(read),
+            Err(reason) => {
+                let fault = ParameterError::conflict("configuration", format!("line {}: {reason}", at + 1));
+                faulty.push(Err::<(), _>(fault));
+            }
+        }
+        if faulty.len() == TOLD_MAX {
+            break;
+        }
     }
-    Ok(read)
+    ParameterError::gather(faulty)?;
+    Ok(passed)
+}
+
+/// Passes a text whose lines are names and numbers.
+///
+/// # Errors
+/// As [`read`].
+pub fn checked(text: String) -> Result<String, ParameterError> {
+    read(&text)?;
+    Ok(text)
 }
 
 /// Name and value of a line; none of an empty line or a comment.
@@ -65,8 +88,20 @@ mod tests {
             "1\t1\tMC_ROLL_P\t6.5\t9",
             "MC_ROLL_P 3.5 4.5",
         ] {
-            let error = read(&format!("RC5_OPTION 153\n{line}\n")).unwrap_err();
+            let error = read(&format!("RC5_OPTION 153\n{line}\n")).unwrap_err().to_string();
             assert!(error.starts_with("line 2: ") && error.contains(line), "{error}");
         }
+    }
+
+    #[test]
+    fn all_faulty_lines_are_told_but_of_a_file_of_another_format() {
+        let told = |text: &str| {
+            let errors = read(text).unwrap_err().into_each();
+            errors.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let both = told("A x\nB 1\n\n# a comment\nC\n");
+        assert_eq!(both.len(), 2, "{both:?}");
+        assert!(both[0].starts_with("line 1: ") && both[1].starts_with("line 5: "), "{both:?}");
+        assert_eq!(told(&"<xml>\n".repeat(1000)).len(), TOLD_MAX);
     }
 }

@@ -17,6 +17,7 @@ mod messages;
 
 use crate::autopilot::{Autopilot, Sensed, Throttles};
 use crate::origin::Origin;
+use crate::parameter_lines;
 use crate::process::Scratch;
 use crate::rest::{Rest, imu_at_rest};
 use crate::settings;
@@ -25,7 +26,7 @@ use bus::component::Info;
 use bus::context::NodeContext;
 use bus::messages::{RC_CHANNELS_MAX, RcChannels, StateEstimate};
 use diagnostics::ParameterError;
-use diagnostics::parameter::{positive_up_to, refuse};
+use diagnostics::parameter::{finite, refuse, up_to};
 use field::MagneticField;
 use folder::Build;
 use mavlink::{Kind, add_frame, frames};
@@ -85,15 +86,15 @@ pub struct Parameters {
     /// Simulated time before tick 0 in which its estimator settles.
     ///
     /// The estimator aligns its attitude within seconds, and its start-up script lets it use a GPS soon after that.
-    #[parameter(default = 20.0)]
+    #[parameter(default = 20.0, check = up_to(settings::REST_MAX_S, "s"))]
     rest_s: f64,
     /// Host time that an answer may take.
-    #[parameter(default = settings::reply_timeout_s())]
+    #[parameter(default = settings::reply_timeout_s(), check = up_to(settings::REPLY_TIMEOUT_MAX_S, "s"))]
     reply_timeout_s: f64,
     /// Host time that an answer may take while its start-up script runs.
     ///
     /// The start-up script runs a few hundred commands, each a process.
-    #[parameter(default = 60.0)]
+    #[parameter(default = 60.0, check = up_to(BOOT_TIMEOUT_MAX_S, "s"))]
     boot_timeout_s: f64,
     /// Airframe of its start-up script.
     #[parameter(default = MODEL.to_owned())]
@@ -102,7 +103,7 @@ pub struct Parameters {
     #[parameter(default = false)]
     ground_station: bool,
     /// Place of the rest before tick 0.
-    #[parameter(default = [0.0; 3])]
+    #[parameter(default = [0.0; 3], check = finite)]
     start_position_m: [f64; 3],
     /// Place on the earth of the world's origin.
     #[parameter(default = Origin::default(), shown = "the home of PX4's simulations, in Zurich", table = Origin)]
@@ -175,32 +176,27 @@ impl Autopilot for Px4 {
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
         let Parameters { vehicle, firmware, configuration, armed_by_channel, rest_s, model, .. } = parameters;
-        let vehicle = settings::vehicle(context, &vehicle)?;
-        let build = Build::read(context, &firmware, &model)?;
-        // A message of the bus has fewer channels than MAVLink's.
-        settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX))?;
-        settings::check_rest(rest_s, ARMED_S, armed_by_channel)?;
-        positive_up_to("boot_timeout_s", parameters.boot_timeout_s, BOOT_TIMEOUT_MAX_S, "s")?;
-        refuse(!parameters.start_position_m.iter().all(|part| part.is_finite()), "start_position_m", || {
-            format!("`start_position_m` is {:?}, expected numbers", parameters.start_position_m)
-        })?;
         let period_ns = context.tick_ns * u64::from(context.period_ticks);
-        refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
-            let period_s = context.period_s();
-            format!(
-                "the period is {period_s} s, expected one of which 4 ms is a multiple: PX4 senses every 4 ms"
-            )
-        })?;
-        let configured = settings::configuration(context, configuration.as_deref())?;
-        let script = airframe::script(&configured, &vehicle)
-            .map_err(|reason| ParameterError::conflict("configuration", reason))?;
+        let configured = settings::configuration(context, configuration.as_deref());
+        let configured = configured.and_then(parameter_lines::checked);
+        let checks = ParameterError::gather([
+            // A message of the bus has fewer channels than MAVLink's.
+            settings::check_arming(armed_by_channel, messages::CHANNELS.min(RC_CHANNELS_MAX)),
+            settings::check_rest(rest_s, ARMED_S, armed_by_channel),
+            check_period(context),
+        ]);
+        let build = Build::read(context, &firmware, &model);
+        let rest = ParameterError::both(build, ParameterError::both(configured, checks));
+        let (vehicle, (build, (configured, _))) =
+            ParameterError::both(settings::vehicle(context, &vehicle), rest)?;
+        let script = airframe::script(&configured, &vehicle)?;
         Ok(Self {
             vehicle,
             build,
             parameters: script,
             every: SENSOR_PERIOD_NS / period_ns,
             rest: Rest { time_s: rest_s, armed_s: ARMED_S, armed_by_channel, period_s: context.period_s() },
-            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s)?,
+            reply_timeout: settings::reply_timeout(parameters.reply_timeout_s),
             boot_timeout: Duration::from_secs_f64(parameters.boot_timeout_s.max(1e-3)),
             model,
             has_ground_station: parameters.ground_station,
@@ -261,6 +257,15 @@ impl Autopilot for Px4 {
         let words = "it has sent no motor outputs for 0.1 s of its time";
         Err(link.stream.firmware().complaint(words))
     }
+}
+
+/// Refuses a period at which the firmware cannot sense.
+fn check_period(context: &NodeContext<'_>) -> Result<(), ParameterError> {
+    let period_ns = context.tick_ns * u64::from(context.period_ticks);
+    refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
+        let period_s = context.period_s();
+        format!("the period is {period_s} s, expected one of which 4 ms is a multiple: PX4 senses every 4 ms")
+    })
 }
 
 impl Px4 {

@@ -141,7 +141,7 @@ impl FlightLog {
     /// Reads the flight at `path` among `files`, the parameter `data`.
     ///
     /// # Errors
-    /// If the file, a column or a unit is missing, or a cell is not a number.
+    /// If the file, columns or units are missing, or cells are not numbers: all faults, and of each column the first faulty cell.
     pub fn load(files: &InputFiles, path: &Path, map: &ColumnMap) -> Result<Self, ParameterError> {
         let bytes = files.bytes(path).map_err(|cause| {
             let hint = "Give its path with --set process.<player>.data=PATH";
@@ -151,19 +151,20 @@ impl FlightLog {
         let table = table.map_err(|cause| refused(path, format_args!(": {cause}")))?;
         let source = Source { path, table };
         source.check_rows()?;
-        let Columns { columns, unit } = &map.time;
-        let mut time_s = source.values::<1>("time", TIME, columns, unit)?;
-        let start_s = time_s.first().map_or(0.0, |first| first[0]);
-        time_s.iter_mut().for_each(|time_s| time_s[0] -= start_s);
+        let time_s = source.times(&map.time);
         let CommandColumns { columns, unit } = &map.command;
-        let command = source.values("command", COUNT, columns, unit)?;
-        let position_m = source.arrays("position", LENGTH, &map.position)?;
-        let velocity_m_s = source.arrays("velocity", VELOCITY, &map.velocity)?;
-        let attitude = source.arrays("attitude", PURE_NUMBER, &map.attitude)?;
-        let rates_rad_s = source.arrays("angular_velocity", SPEED, &map.angular_velocity)?;
-        source.check_values(&time_s, &attitude, &map.attitude.columns[3])?;
+        let command = source.values("command", COUNT, columns, unit);
+        let position_m = source.arrays("position", LENGTH, &map.position);
+        let velocity_m_s = source.arrays("velocity", VELOCITY, &map.velocity);
+        let attitude = source.arrays("attitude", PURE_NUMBER, &map.attitude);
+        let attitude = attitude.and_then(|attitude| source.directed(attitude, &map.attitude.columns[3]));
+        let rates_rad_s = source.arrays("angular_velocity", SPEED, &map.angular_velocity);
+        let turning = ParameterError::both(attitude, rates_rad_s);
+        let motion = ParameterError::both(ParameterError::both(position_m, velocity_m_s), turning);
+        let ((time_s, command), ((position_m, velocity_m_s), (attitude, rates_rad_s))) =
+            ParameterError::both(ParameterError::both(time_s, command), motion)?;
         let row = |index: usize| Row {
-            time_s: time_s[index][0],
+            time_s: time_s[index],
             command: command[index],
             position_m: position_m[index],
             velocity_m_s: velocity_m_s[index],
@@ -295,20 +296,27 @@ impl Source<'_> {
             let place = self.table.column(column);
             place.map_err(|cause| refused(self.path, format_args!(", the map's `{quantity}`: {cause}")))
         };
-        let indices = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
         let factor = dimension.factor(unit).ok_or_else(|| {
             let expected = dimension.names(" or ");
             let message = format!("`{quantity}` has the unit `{unit}`, expected {expected}");
             ParameterError::conflict("data", message)
-        })?;
-        let sample = |row: table::Row<'_>| -> Result<Bounded<f64, N>, ParameterError> {
-            let cell = |(index, column): (&usize, &String)| {
-                number(self.table.number(row.cell(*index)), factor)
-                    .map_err(|expected| self.cell(row.line, column, row.cell(*index), expected))
-            };
-            indices.iter().zip(columns).map(cell).collect()
+        });
+        let indices = ParameterError::gather(columns.iter().map(place));
+        let (indices, factor) = ParameterError::both(indices, factor)?;
+        let cell = |row: table::Row<'_>, (index, column): (&usize, &String)| {
+            number(self.table.number(row.cell(*index)), factor)
+                .map_err(|expected| self.cell(row.line, column, row.cell(*index), expected))
         };
-        self.table.rows.iter().map(sample).collect()
+        let sample = |row: table::Row<'_>| -> Result<Bounded<f64, N>, ParameterError> {
+            indices.iter().zip(columns).map(|column| cell(row, column)).collect()
+        };
+        let samples: Result<Vec<_>, ParameterError> = self.table.rows.iter().map(sample).collect();
+        samples.map_err(|first| {
+            // All cells of a column may be faulty: the first one is told.
+            let fault = |column| self.table.rows.iter().find_map(|row| cell(row, column).err());
+            let mut faults = indices.iter().zip(columns).filter_map(fault);
+            faults.next().map_or(first, |one| one.and(faults))
+        })
     }
 
     /// Refuses a file with too few rows, or with rows of another length than the header's, as with decimal commas.
@@ -325,23 +333,22 @@ impl Source<'_> {
         Err(refused(self.path, fault))
     }
 
-    /// Refuses times that do not grow, and quaternions without a direction.
-    fn check_values(
-        &self,
-        time_s: &[Bounded<f64, 1>],
-        attitude: &[[f64; 4]],
-        last_part: &str,
-    ) -> Result<(), ParameterError> {
-        let rows = &self.table.rows;
-        let is_zero = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN;
-        if let Some(index) = attitude.iter().position(is_zero) {
-            let (found, expected) =
-                (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
-            return Err(self.cell(rows.line(index), last_part, &found, expected));
-        }
-        let Some(index) = time_s.windows(2).position(|pair| pair[1][0] <= pair[0][0]) else { return Ok(()) };
-        let line = rows.line(index);
+    /// The times since the first row, which have to grow.
+    fn times(&self, map: &Columns<1>) -> Result<Vec<f64>, ParameterError> {
+        let rows = self.arrays("time", TIME, map)?;
+        let start_s = rows.first().map_or(0.0, |[first_s]| *first_s);
+        let time_s: Vec<f64> = rows.iter().map(|[time_s]| time_s - start_s).collect();
+        let Some(index) = time_s.windows(2).position(|pair| pair[1] <= pair[0]) else { return Ok(time_s) };
+        let line = self.table.rows.line(index);
         Err(refused(self.path, format_args!(": time does not grow from line {line} to the next")))
+    }
+
+    /// Passes quaternions that have a direction; `last_part` is the column of their last numbers.
+    fn directed(&self, attitude: Vec<[f64; 4]>, last_part: &str) -> Result<Vec<[f64; 4]>, ParameterError> {
+        let is_zero = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>() < NORM_MIN * NORM_MIN;
+        let Some(index) = attitude.iter().position(is_zero) else { return Ok(attitude) };
+        let (found, expected) = (attitude[index][3].to_string(), "part of an attitude: the quaternion is 0");
+        Err(self.cell(self.table.rows.line(index), last_part, &found, expected))
     }
 
     fn cell(&self, line: u64, column: &str, found: &str, expected: &str) -> ParameterError {

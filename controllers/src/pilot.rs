@@ -7,6 +7,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
 use diagnostics::parameter::{ParameterError, refuse};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Parameters of the pilot.
@@ -93,12 +94,15 @@ impl Component for Pilot {
         let read = ParameterError::both(schedule, sticks);
         let (_, (schedule, sticks)) = ParameterError::both(numbers, read)?;
         let taken = |entry: &&SetPointEntry| sticks.as_ref().is_some_and(|it| it.has(&entry.channel));
-        if let Some(SetPointEntry { channel, .. }) = parameters.set_points.iter().find(taken) {
+        let taken: BTreeSet<&str> =
+            parameters.set_points.iter().filter(taken).map(|entry| entry.channel.as_str()).collect();
+        let twice = taken.into_iter().map(|channel| {
             let message = format!(
                 "`set_points` has an entry on channel {channel}, which the sticks in `data` hold; leave one of them out"
             );
-            return Err(ParameterError::conflict("set_points", message));
-        }
+            Err::<(), _>(ParameterError::conflict("set_points", message))
+        });
+        ParameterError::gather(twice)?;
         warn_of_late(&parameters.set_points, context);
         Ok(Self { schedule, sticks, from_s })
     }

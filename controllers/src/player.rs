@@ -115,8 +115,12 @@ impl Component for Player {
     }
 
     fn rehearse(self, context: &NodeContext<'_>) -> Result<(), ParameterError> {
-        require_length(&self.log, self.from_s, context)?;
-        if self.gaps == Gaps::Hold { Ok(()) } else { require_no_gap(&self.log, self.from_s, context) }
+        let length = require_length(&self.log, self.from_s, context);
+        let gaps = match self.gaps {
+            Gaps::Refuse => require_no_gap(&self.log, self.from_s, context),
+            Gaps::Hold => Ok(()),
+        };
+        ParameterError::both(length, gaps).map(drop)
     }
 
     fn initial(&self) {}

@@ -9,6 +9,7 @@ use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, refuse, require};
 use inputs::InputFiles;
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use vehicles::table::{Dialect, Table, TableError, names, shown};
@@ -114,23 +115,23 @@ impl Component for Rc {
         });
         let recording = data.map(|path| Recording::load(&context.files, &path)).transpose();
         let (recording, ()) = ParameterError::both(recording, start)?;
-        if let Some(recording) = &recording {
-            recording.check_times(from_s, context)?;
-        }
-        let of_recording = |channel: usize| recording.as_ref().is_some_and(|it| it.has(channel));
-        if let Some(Move { channel, .. }) = script.iter().find(|it| of_recording(it.channel)) {
+        let recorded: BTreeSet<usize> =
+            recording.iter().flat_map(|recording| recording.channels.iter().copied()).collect();
+        let moved: BTreeSet<usize> = script.iter().map(|it| it.channel).collect();
+        let twice = moved.intersection(&recorded).map(|channel| {
             let message =
                 format!("`script` moves channel {channel}, which `data` records; leave one of them out");
-            return Err(ParameterError::conflict("script", message));
-        }
-        let recorded = recording.iter().flat_map(|recording| recording.channels.iter().copied());
-        let highest = script.iter().map(|it| it.channel).chain(recorded).max().unwrap_or(0).max(STICKS);
+            Err::<(), _>(ParameterError::conflict("script", message))
+        });
+        let highest = moved.union(&recorded).max().copied().unwrap_or(0).max(STICKS);
         let channels = channels.unwrap_or(highest);
-        refuse(!(highest..=RC_CHANNELS_MAX).contains(&channels), "channels", || {
+        let count = refuse(!(highest..=RC_CHANNELS_MAX).contains(&channels), "channels", || {
             format!(
                 "`channels` is {channels}, expected {highest} to {RC_CHANNELS_MAX}: channel {highest} is used"
             )
-        })?;
+        });
+        let times = recording.as_ref().map_or(Ok(()), |recording| recording.check_times(from_s, context));
+        ParameterError::gather(twice.chain([count, times]))?;
         script.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         if let Some(Move { channel, at_s, pulse_us, .. }) = never_acting(&script) {
             let message = format!(
@@ -310,10 +311,6 @@ impl Recording {
             );
         }
         Ok(())
-    }
-
-    fn has(&self, channel: usize) -> bool {
-        self.channels.contains(&channel)
     }
 
     /// Returns the index of the newest row at `time_s`; of the first one before it.

@@ -193,21 +193,27 @@ impl Parameters {
             });
             return ParameterError::gather(lonely).map(|_| None);
         };
-        refuse(
+        let is_constant = refuse(
             self.mode == Mode::Varying,
             "room_m",
             || "`room_m` has a meaning only in the mode \"constant\"; leave it out",
-        )?;
+        );
         let least_m = 2.0 * self.distance_m;
         let has_room = size_m.iter().all(|side_m| side_m.is_finite() && *side_m > least_m);
         let expected = format!("two lengths above 2 distance_m = {least_m} m");
-        require("room_m", format_args!("{size_m:?}"), has_room, expected)?;
+        let room = require("room_m", format_args!("{size_m:?}"), has_room, expected);
+        ParameterError::gather([is_constant, room, self.start_within(size_m, has_room)])?;
         let ahead_min_m = self.ahead_min_m.unwrap_or(AHEAD_MIN_M);
-        let start_m = self.start_in_room_m.unwrap_or(size_m);
-        let is_within = start_m.iter().zip(size_m).all(|(at_m, side_m)| (0.0..=side_m).contains(at_m));
-        let expected = format!("within room_m = {size_m:?} m");
-        require("start_in_room_m", format_args!("{start_m:?}"), is_within, expected)?;
         Ok(Some(Shared { room: Room { size_m }, start_m: self.start_in_room_m, ahead_min_m }))
+    }
+
+    /// Refuses a start outside of a room of this size. A room that is refused does not limit the start.
+    fn start_within(&self, size_m: [f64; 2], has_room: bool) -> Result<(), ParameterError> {
+        let Some(start_m) = self.start_in_room_m else { return Ok(()) };
+        let limits_m = if has_room { size_m } else { [f64::INFINITY; 2] };
+        let is_within = start_m.iter().zip(limits_m).all(|(at_m, limit_m)| (0.0..=limit_m).contains(at_m));
+        let expected = format!("within room_m = {size_m:?} m");
+        require("start_in_room_m", format_args!("{start_m:?}"), is_within, expected)
     }
 }
 

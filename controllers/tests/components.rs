@@ -128,6 +128,10 @@ fn impossible_parameters_are_refused_by_their_key() {
         let error = kind.check(&parameters, &NodeContext::new("node", &[])).unwrap_err().to_string();
         assert!(error.contains(key), "{} with {parameters}: {error}", kind.name);
     }
+    // Both faults of a room.
+    let both = with(&with(&room, "mode", json!("varying")), "start_in_room_m", json!([1.0, 11.0]));
+    let errors = wall_follow.check(&both, &NodeContext::new("node", &[])).unwrap_err().into_each();
+    assert_eq!(errors.len(), 2, "{errors:?}");
 }
 
 #[test]

@@ -69,12 +69,27 @@ mod tests {
             (json!({ "dead_zone_m": 0.2 }), "`dead_zone_m`"),
             (json!({ "room_m": [4.0, 4.0] }), "`start_in_room_m` must be given where `room_m` is"),
             (json!({ "start_in_room_m": [4.0, 4.0] }), "`room_m` must be given where `start_in_room_m` is"),
-            (json!({ "room_m": [4.0, 4.0], "start_in_room_m": [2.0, 5.0] }), "`room_m`"),
+            (
+                json!({ "room_m": [4.0, 4.0], "start_in_room_m": [2.0, 5.0] }),
+                "`room_m.1` must be a finite number above `start_in_room_m.1`, 5, found 4",
+            ),
         ] {
             let error = Harness::<RangeInertial>::from_json(&parameters).unwrap_err().to_string();
             assert!(error.contains(key), "{error}");
         }
         Harness::<RangeInertial>::from_json(&json!({})).unwrap();
+    }
+
+    #[test]
+    fn all_faults_of_a_room_are_named() {
+        let keys = |room_m: [f64; 2], start_in_room_m: [f64; 2]| {
+            let parameters = json!({ "room_m": room_m, "start_in_room_m": start_in_room_m });
+            let error = Harness::<RangeInertial>::from_json(&parameters).unwrap_err();
+            error.into_each().iter().map(|error| error.key().to_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(keys([4.0, 4.0], [-1.0, 5.0]), ["start_in_room_m.0", "room_m.1"]);
+        assert_eq!(keys([0.0, 4.0], [-1.0, 1.0]), ["start_in_room_m.0", "room_m.0"]);
+        assert_eq!(keys([4.0, -4.0], [1.0, 1.0]), ["room_m.1"]);
     }
 
     /// At rest by the accelerometer, which is off by 0.2 m/s^2, ranges to nothing, and a receiver that reports

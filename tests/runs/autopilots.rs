@@ -282,6 +282,30 @@ fn what_cannot_be_a_firmware_is_refused_by_check() {
     }
 }
 
+#[test]
+fn all_faults_of_the_settings_of_a_firmware_are_told() {
+    let place = Place::new();
+    let check = |settings: &[&str]| {
+        let settings: Vec<String> =
+            settings.iter().map(|setting| format!("process.controller.{setting}")).collect();
+        call(&place, "check", &manifest(), &settings, &[]).with_code(2)
+    };
+    let settings = [
+        "vehicle=/nowhere/bird.toml",
+        "firmware=/bin/ls",
+        "configuration=/nowhere/configuration",
+        "parameters.armed_by_channel=4",
+    ];
+    check(&settings).says(&[
+        "/nowhere/bird.toml",
+        "/bin/ls: it is not Betaflight's SITL",
+        "cannot read /nowhere/configuration",
+        "`armed_by_channel` is 4, expected 5 to 16",
+    ]);
+    let ranges = ["parameters.rc_rate_hz=0", "parameters.reply_timeout_s=0", "parameters.colour=1"];
+    check(&[&settings[1..2], &ranges].concat()).says(&["rc_rate_hz", "reply_timeout_s", "colour"]);
+}
+
 /// The Hummingbird with the text `from` of its file replaced by `to`, as a setting of the manifest.
 fn vehicle_with(place: &Place, from: &str, to: &str) -> String {
     let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();

@@ -83,6 +83,24 @@ fn a_column_map_without_a_unit_or_with_a_wrong_one() {
         .says(&["`time` has the unit `h`", "\"s\" or \"ms\" or \"us\""]);
 }
 
+/// A column that is missing, a unit, a cell, times and a quaternion.
+#[test]
+fn all_faults_of_a_flight_are_told() {
+    let flight = flight()
+        .replacen(",py,", ",sideways,", 1)
+        .replacen("0.010,0.001,0,1,0.01,", "0.010,0.001,0,1,left,", 1)
+        .replacen("0.020,", "0.010,", 1)
+        .replacen("0,0,0,1,0,0,0,5,", "0,0,0,0,0,0,0,5,", 1);
+    let wrong = "process.player.parameters.columns.angular_velocity.unit=h";
+    refused_replay(&flight, &[&FROM_THE_START[..], &["--set", wrong]].concat()).says(&[
+        "no column `py`",
+        "line 3, column `vx`: \"left\" is not a finite number",
+        "time does not grow from line 3",
+        "line 7, column `qw`: \"0\" is not part of an attitude",
+        "`angular_velocity` has the unit `h`",
+    ]);
+}
+
 #[test]
 fn a_run_that_plays_a_gap() {
     let without = |line: &(usize, &str)| !(40..60).contains(&line.0);

@@ -2,6 +2,7 @@
 
 use super::frames::FrameNumbers;
 use crate::parameter_lines;
+use diagnostics::ParameterError;
 use std::fmt::Write as _;
 
 /// Pulse of a motor that is off, and the way to full thrust, us.
@@ -18,8 +19,8 @@ const DEFAULTS: [(&str, &str); 2] = [("AHRS_EKF_TYPE", "3"), ("LOG_BACKEND_TYPE"
 /// Text of the file with the user's parameters of `configured`, for a frame of `motors` motors.
 ///
 /// # Errors
-/// A line is not a name and a number.
-pub fn text(configured: &str, frame: &FrameNumbers, motors: usize) -> Result<String, String> {
+/// Lines are not a name and a number.
+pub fn text(configured: &str, frame: &FrameNumbers, motors: usize) -> Result<String, ParameterError> {
     let follows = follows(frame, motors);
     let mut lines = parameter_lines::read(configured)?;
     // The firmware does not say which one of two values of a name counts.

@@ -4,6 +4,7 @@
 //! described; axes forward, right, down.
 
 use crate::parameter_lines;
+use diagnostics::ParameterError;
 use std::fmt::Write as _;
 use vehicles::Vehicle;
 
@@ -18,8 +19,8 @@ const FIRST: [(&str, i32); 3] = [("SDLOG_MODE", -1), ("SENS_IMU_MODE", 1), ("EKF
 /// Commands of the start-up script that set the user's parameters of `configured` and those of `vehicle`.
 ///
 /// # Errors
-/// A line is not a name and a number.
-pub fn script(configured: &str, vehicle: &Vehicle) -> Result<String, String> {
+/// Lines are not a name and a number.
+pub fn script(configured: &str, vehicle: &Vehicle) -> Result<String, ParameterError> {
     let mut text = String::new();
     let mut set = |name: &str, value: &dyn std::fmt::Display| {
         let _ = writeln!(text, "param set {name} {value}");
@@ -85,6 +86,7 @@ mod tests {
     #[test]
     fn lines_that_are_no_parameters_are_refused() {
         let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
-        assert!(script("MC_ROLL_P", &vehicle).unwrap_err().starts_with("line 1: expected a name"));
+        let error = script("MC_ROLL_P", &vehicle).unwrap_err().to_string();
+        assert!(error.starts_with("line 1: expected a name"), "{error}");
     }
 }

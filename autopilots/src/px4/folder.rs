@@ -47,9 +47,9 @@ impl Build {
     /// Reads the build of the program at `firmware`, with the airframe `model`.
     ///
     /// # Errors
-    /// A file is missing.
+    /// Files are missing.
     pub fn read(context: &NodeContext<'_>, firmware: &Path, model: &str) -> Result<Self, ParameterError> {
-        let program = settings::preloadable(context, firmware, "PX4's SITL, build/px4_sitl_default/bin/px4")?;
+        let program = settings::preloadable(context, firmware, "PX4's SITL, build/px4_sitl_default/bin/px4");
         let refused = |reason: String| ParameterError::conflict("firmware", reason);
         let unread = |path: &Path, error: io::Error| {
             let path = path.display();
@@ -57,7 +57,11 @@ impl Build {
                 "cannot read {path}: {error}: PX4 needs the folder `etc` of its build beside that of its program, bin/px4"
             ))
         };
-        let source = fs::canonicalize(firmware).map_err(|error| unread(firmware, error))?;
+        let source = match fs::canonicalize(firmware) {
+            Ok(source) => source,
+            // A missing program is told once.
+            Err(error) => return Err(program.err().unwrap_or_else(|| unread(firmware, error))),
+        };
         let bin = source.parent().unwrap_or(&source);
         let folder = bin.parent().unwrap_or(bin);
         let mut names = Vec::new();
@@ -73,15 +77,18 @@ impl Build {
                  of its program, bin/px4",
                 airframes.display()
             ))
-        })?;
-        names.push(airframe.clone());
+        });
+        names.extend(airframe.as_ref().ok().cloned());
         let read = |path: &Path| context.files.bytes(path).map_err(|error| unread(path, error));
         let script = |name: PathBuf| {
             let bytes = read(&folder.join(&name))?;
             Ok((name, bytes.to_vec()))
         };
-        let aliases = String::from_utf8_lossy(&read(&bin.join(ALIASES))?).into_owned();
-        let scripts = names.into_iter().map(script).collect::<Result<_, ParameterError>>()?;
+        let aliases = read(&bin.join(ALIASES)).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        let scripts = ParameterError::gather(names.into_iter().map(script));
+        let files = ParameterError::both(aliases, scripts);
+        let (program, (airframe, (aliases, scripts))) =
+            ParameterError::both(program, ParameterError::both(airframe, files))?;
         Ok(Self { program, aliases, scripts, airframe })
     }
 

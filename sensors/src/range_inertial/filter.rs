@@ -156,8 +156,7 @@ impl RangeInertial {
     /// A parameter or the period is outside its range.
     pub fn with_period(params: RangeInertialParams, period_s: f64) -> Result<Self, ParameterError> {
         params.validate()?;
-        params.validate_room()?;
-        positive("period_s", period_s)?;
+        ParameterError::both(params.validate_room(), positive("period_s", period_s))?;
         Ok(Self { params, period_s })
     }
 

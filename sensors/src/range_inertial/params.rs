@@ -1,6 +1,6 @@
 //! The parameters of the range-inertial estimator.
 
-use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
+use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 
 /// Uncertainties of the range finders, the IMU and the attitude, and the start of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
@@ -98,16 +98,23 @@ impl RangeInertialParams {
     /// A room has a size and a place within it, or is not known.
     pub(super) fn validate_room(&self) -> Result<(), ParameterError> {
         let missing = |key, expected| Err(ParameterError::value(key, expected, "nothing"));
-        match (self.room_m, self.start_in_room_m) {
+        let sides = match (self.room_m, self.start_in_room_m) {
             (Some(_), None) => return missing("start_in_room_m", "given where `room_m` is"),
             (None, Some(_)) => return missing("room_m", "given where `start_in_room_m` is"),
-            _ => {}
-        }
-        let (sizes, starts) = (self.room_m.into_iter().flatten(), self.start_in_room_m.into_iter().flatten());
-        for (size_m, start_m) in sizes.zip(starts) {
-            not_negative("start_in_room_m", start_m)?;
-            positive("room_m", size_m - start_m)?;
-        }
-        Ok(())
+            (sizes_m, starts_m) => sizes_m.into_iter().flatten().zip(starts_m.into_iter().flatten()),
+        };
+        let check = |(axis, (size_m, start_m))| validate_side(axis, size_m, start_m);
+        ParameterError::gather(sides.enumerate().map(check)).map(drop)
     }
+}
+
+/// Checks the size of a room along `axis`, and the place within it.
+fn validate_side(axis: usize, size_m: f64, start_m: f64) -> Result<(), ParameterError> {
+    let (room, start) = (format!("room_m.{axis}"), format!("start_in_room_m.{axis}"));
+    let is_start_good = not_negative(&start, start_m);
+    // A start that is refused does not limit the room.
+    let least_m = if is_start_good.is_ok() { start_m } else { 0.0 };
+    let expected = format!("a finite number above `{start}`, {least_m}");
+    let is_room_good = require(&room, size_m, size_m.is_finite() && size_m > least_m, expected);
+    ParameterError::both(is_start_good, is_room_good).map(drop)
 }

@@ -165,6 +165,25 @@ fn what_cannot_be_an_ardupilot_is_refused_by_check() {
 }
 
 #[test]
+fn all_faults_of_the_settings_of_an_ardupilot_are_told() {
+    let place = Place::new();
+    let wrong = place.write("wrong.parm", "FRAME_CLASS\n# two\nPSC_X one\n");
+    let settings = [
+        "process.controller.firmware=/bin/ls".to_owned(),
+        format!("process.controller.configuration={wrong}"),
+        "process.controller.parameters.rest_s=3".to_owned(),
+        "process.controller.period_ticks=100".to_owned(),
+    ];
+    call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(&[
+        "/bin/ls: it is not ArduCopter's SITL",
+        "line 1: expected a name",
+        "line 3: expected a name",
+        "`rest_s` is 3 s, expected more than 4 s",
+        "the period is 0.1 s, expected less than 0.1 s",
+    ]);
+}
+
+#[test]
 fn the_shipped_hexacopter_and_octocopter_are_taken() {
     let place = Place::new();
     let settings = stand_in(&place, "");

@@ -196,6 +196,22 @@ fn what_cannot_be_a_px4_is_refused_by_check() {
 }
 
 #[test]
+fn all_faults_of_the_settings_of_a_px4_are_told() {
+    let place = Place::new();
+    let mut settings = stand_in(&place, "");
+    settings.extend(
+        ["model=iris2", "armed_by_channel=17", "rest_s=2"]
+            .map(|setting| format!("process.controller.parameters.{setting}")),
+    );
+    settings.push("process.controller.period_ticks=3".to_owned());
+    call(&place, "check", &manifest(), &settings, &[]).with_code(2).says(&[
+        "no airframe with the name `iris2`",
+        "`armed_by_channel` is 17, expected 5 to 16",
+        "the period is 0.003 s",
+    ]);
+}
+
+#[test]
 fn a_px4_without_its_start_up_script_is_refused_by_check() {
     let place = Place::new();
     let mut settings = stand_in(&place, "");
