@@ -264,7 +264,7 @@ impl World for HostWorld<'_> {
         reply.send(answer);
     }
 
-    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic> {
+    fn backup_of(&self, process: &str, with: &str) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic> {
         successor_of(self.manifest, self.plan, self.files, process, with)
     }
 }

@@ -65,8 +65,8 @@ pub struct Supervisor<'a, W: World> {
     clock: WatchClock,
     /// Processor time in nanoseconds, and deadlines missed, of each node's instances that have left.
     spent: Vec<Spent>,
-    /// Swaps that were requested and have not ended: the request, and the place of its answer.
-    swaps: Vec<(u32, W::Reply)>,
+    /// Swaps that were requested and have not ended: the request, the warnings of its backup, and the place of its answer.
+    swaps: Vec<(u32, Vec<String>, W::Reply)>,
     requests: u32,
     stop: &'a StopToken,
     stops_seen: usize,

@@ -92,11 +92,11 @@ pub trait World {
     fn next_request(&mut self) -> Option<(Request, Self::Reply)>;
     /// Answers a request.
     fn answer(&mut self, reply: Self::Reply, answer: &Answer);
-    /// The backup of `process` that a request describes as `with`.
+    /// The backup of `process` that a request describes as `with`, and its legal but unusual values.
     ///
     /// # Errors
     /// If there is no such process, or the backup cannot replace it.
-    fn backup_of(&self, process: &str, with: &str) -> Result<BackupSpec, Diagnostic>;
+    fn backup_of(&self, process: &str, with: &str) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic>;
 }
 
 /// A started process.

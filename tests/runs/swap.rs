@@ -252,6 +252,27 @@ fn a_live_swap_that_cannot_be_is_refused_and_the_run_flies_on() {
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 
+/// As `check` does for a swap in the manifest.
+#[test]
+fn a_live_swap_to_a_sensor_with_new_measurements_at_other_ticks_is_warned_of() {
+    let place = Place::new();
+    let gps = "[process.gps]\nkind = \"gps\"\ninputs.state = \"/plant/state\"\n";
+    let (manifest, recording) = (hover_with(&place, "gps.toml", gps), place.path("live.mcap"));
+    let mut launch = place.start(&["run", &manifest, "--record", &recording]);
+    launch.hold_at(300);
+    let run = place.run_id();
+    let swap = |with: &str| place.start(&["swap", "gps", "--with", with, "--run", &run, "--json"]);
+    let first = swap("parameters.rate_hz = 20.0");
+    launch.await_slot("gps", 1);
+    launch.release();
+    let told = ["warning: ", "0, 80, 130, 180, … (20 Hz)", "some of its samples are never sent"];
+    let ended = first.end_among_others().with_code(0);
+    ended.says(&told);
+    let answer = ended.json();
+    assert!(answer["warnings"][0].as_str().unwrap().contains("as before"), "{answer}");
+    launch.end().flown();
+}
+
 /// The last measurement of its gps arrives at tick 1480.
 #[test]
 fn a_live_swap_whose_take_over_would_come_after_the_last_measurement_is_refused_as_it_joins() {

@@ -122,7 +122,8 @@ impl<'a> ControlServer<'a> {
     }
 
     fn answer(&self, reply: Reply, text: String) {
-        reply.send(&Answer::Done { text, tick: self.control.completed_ticks() });
+        let (tick, warnings) = (self.control.completed_ticks(), Vec::new());
+        reply.send(&Answer::Done { text, tick, warnings });
     }
 
     /// Refuses the waiting request that a later one replaces; true if there was one.

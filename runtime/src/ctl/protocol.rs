@@ -83,6 +83,9 @@ pub enum Answer {
         text: String,
         /// Ticks that every process has completed.
         tick: u32,
+        /// Legal but unusual values of a process that was swapped in, with their places.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        warnings: Vec<String>,
     },
     /// Progress of the run.
     Status(Status),
@@ -269,7 +272,7 @@ mod tests {
 
     #[test]
     fn an_answer_is_one_json_object() {
-        let done = Answer::Done { text: "paused at tick 5".to_owned(), tick: 5 };
+        let done = Answer::Done { text: "paused at tick 5".to_owned(), tick: 5, warnings: Vec::new() };
         assert_eq!(
             serde_json::to_string(&done).unwrap(),
             r#"{"answer":"done","text":"paused at tick 5","tick":5}"#

@@ -68,7 +68,7 @@ pub fn all(
     Ok(placed.into_iter().map(|(backup, _)| backup).collect())
 }
 
-/// As [`backup_of`], for a backup that takes over.
+/// As [`backup_of`], for a backup that takes over; with its legal but unusual values.
 ///
 /// # Errors
 /// As [`backup_of`], or if the backup does not go on from the state of its process, and has to.
@@ -78,12 +78,14 @@ pub fn successor_of(
     files: &InputFiles,
     process: &str,
     with_text: &str,
-) -> Result<BackupSpec, Diagnostic> {
-    let backup = backup_of(manifest, plan, files, process, with_text)?;
+) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic> {
+    let mut notes = Notes::default();
+    let backup = noting_backup_of(manifest, plan, files, (process, with_text), &mut notes)?;
     let (manifest, _, whole) = manifest.succeed(process, with_text)?;
     let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
-    run.require_state(&backup, &whole.span()).map(|()| backup)
+    run.require_state(&backup, &whole.span())?;
+    Ok((backup, notes.warnings))
 }
 
 /// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML with its
@@ -99,11 +101,22 @@ pub fn backup_of(
     process: &str,
     with_text: &str,
 ) -> Result<BackupSpec, Diagnostic> {
+    noting_backup_of(manifest, plan, files, (process, with_text), &mut Notes::default())
+}
+
+/// As [`backup_of`], of a process and the text with its differences; notes unusual values.
+fn noting_backup_of(
+    manifest: &Manifest,
+    plan: &Plan,
+    files: &InputFiles,
+    (process, with_text): (&str, &str),
+    notes: &mut Notes,
+) -> Result<BackupSpec, Diagnostic> {
     let (manifest, name, whole) = manifest.succeed(process, with_text)?;
     let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
     let node = run.node(&name)?;
-    let backup = run.resolve(node, whole.get_ref(), &whole.span(), &mut Notes::default())?;
+    let backup = run.resolve(node, whole.get_ref(), &whole.span(), notes)?;
     Ok(BackupSpec { with: Some(with_text.to_owned()), ..backup })
 }
 

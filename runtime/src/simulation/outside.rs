@@ -172,14 +172,16 @@ impl World for SimWorld {
         assert!(before.is_none(), "answered twice: {before:?}, {answer:?}");
     }
 
-    fn backup_of(&self, process: &str, _: &str) -> Result<BackupSpec, Diagnostic> {
+    fn backup_of(&self, process: &str, _: &str) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic> {
         let sim = self.0.borrow();
         let node = sim.plan.nodes.iter().position(|node| node.name == process);
         let node = node.ok_or_else(|| Diagnostic::in_file("m.toml", "no such process"))?;
         let program = settings::program(OnExit::Stop);
         let plan = sim.plan.nodes[node].clone();
         let (take_over_tick, with) = (None, None);
-        Ok(BackupSpec { node, join_tick: 0, take_over_tick, is_standby: false, with, program, plan })
+        let backup =
+            BackupSpec { node, join_tick: 0, take_over_tick, is_standby: false, with, program, plan };
+        Ok((backup, Vec::new()))
     }
 }
 

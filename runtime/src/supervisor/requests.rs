@@ -43,8 +43,8 @@ fn advice(plan: &Plan, node: usize, (granted, end): (u32, u32), shadow_ticks: u3
     }
 }
 
-/// The answer to a swap that has ended.
-fn answer(report: &Report) -> Answer {
+/// The answer to a swap that has ended, with the `warnings` of its backup.
+fn answer(report: &Report, warnings: Vec<String>) -> Answer {
     match (&report.refused, report.take_over_tick) {
         (Some(reason), _) => Answer::refused(reason.clone()),
         (None, Some(tick)) => Answer::Done {
@@ -55,6 +55,7 @@ fn answer(report: &Report) -> Answer {
                 report.hand_over.unwrap_or("nothing")
             ),
             tick,
+            warnings,
         },
         (None, None) => Answer::refused("the run ended before the take-over"),
     }
@@ -67,28 +68,28 @@ impl<W: World> Supervisor<'_, W> {
             let Some((request, reply)) = self.world.next_request() else { break };
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
-                Ok(request) => self.swaps.push((request, reply)),
+                Ok((request, warnings)) => self.swaps.push((request, warnings, reply)),
                 Err(refused) => self.world.answer(reply, &Answer::refused(refused.to_string())),
             }
         }
-        for (request, reply) in std::mem::take(&mut self.swaps) {
+        for (request, warnings, reply) in std::mem::take(&mut self.swaps) {
             let mut reports = self.decisions.replacements.reports.iter();
             match reports.find(|report| report.request == Some(request)) {
-                Some(report) => self.world.answer(reply, &answer(report)),
-                None => self.swaps.push((request, reply)),
+                Some(report) => self.world.answer(reply, &answer(report, warnings)),
+                None => self.swaps.push((request, warnings, reply)),
             }
         }
     }
 
-    /// Checks a requested swap, and has its backup started; returns the number of the request.
+    /// Checks a requested swap, and has its backup started; returns the number of the request, and the warnings of the backup.
     fn request_swap(
         &mut self,
         process: &str,
         with: &str,
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
-    ) -> Result<u32> {
-        let backup = self.world.backup_of(process, with)?;
+    ) -> Result<(u32, Vec<String>)> {
+        let (backup, warnings) = self.world.backup_of(process, with)?;
         self.require_claimed_log(&backup)?;
         if self.decisions.state != State::Running {
             bail!("the run does not fly: `{process}` cannot be swapped now");
@@ -107,7 +108,7 @@ impl<W: World> Supervisor<'_, W> {
         }
         self.requests += 1;
         self.decisions.replacements.request_swap(backup, shadow_ticks, at_tick, self.requests);
-        Ok(self.requests)
+        Ok((self.requests, warnings.iter().map(ToString::to_string).collect()))
     }
 
     /// Refuses a take-over at `tick` for which `backup` cannot join in time, or at which it does not send.
