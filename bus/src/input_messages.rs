@@ -1,8 +1,13 @@
 //! Messages by type, from which the inputs of any component are read without the names of its ports.
 
-use crate::message::{Message, view_mut};
+use crate::message::{BODY_START, Message, view_mut};
+use crate::messages::{Orientation, Quaternion};
 use crate::ports::{InputPorts, InputSamples, Inputs, PortSpec};
 use crate::sample_memory::{SampleMemory, empty_sample};
+use crate::schema::{Kind, Schema};
+
+/// Types of attitudes, with the parts x, y, z, w.
+const ATTITUDES: [&str; 2] = [Quaternion::SCHEMA.type_name, Orientation::SCHEMA.type_name];
 
 /// Messages, at most one of each type, for callers that step components without knowing their ports.
 ///
@@ -44,8 +49,8 @@ impl InputMessages {
         self
     }
 
-    /// Reads inputs: each port has the message of its type. Without such a message a port that must be wired has zeros,
-    /// and one that may be left out has `None`.
+    /// Reads inputs: each port has the message of its type. Without such a message a port that must be wired has zeros
+    /// and level attitudes, and one that may be left out has `None`.
     #[must_use]
     pub fn read<'a, I: InputPorts<'a>>(&self, memory: &'a mut InputMemory) -> I {
         let ports: &[PortSpec] = if let Inputs::Ports(ports) = I::DECLARED { ports } else { &[] };
@@ -55,15 +60,43 @@ impl InputMessages {
 
     fn sample(&self, port: &PortSpec) -> Option<Box<[u64]>> {
         let given = self.samples.iter().find(|(type_name, _)| *type_name == port.schema.type_name);
-        let zeros = || port.required.then(|| empty_sample(port.schema.size));
-        given.map(|(_, words)| words.clone()).or_else(zeros)
+        let neutral = || port.required.then(|| neutral_sample(port.schema));
+        given.map(|(_, words)| words.clone()).or_else(neutral)
+    }
+}
+
+/// A sample of zeros, but for its attitudes, which are level: a quaternion of zeros is not an attitude.
+fn neutral_sample(schema: &Schema) -> Box<[u64]> {
+    let mut words = empty_sample(schema.size);
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+    level_message(schema, &mut bytes[BODY_START..]);
+    words
+}
+
+/// Makes the attitudes in a message of zeros level.
+fn level_message(schema: &Schema, bytes: &mut [u8]) {
+    if ATTITUDES.contains(&schema.type_name) {
+        bytes[..size_of::<Quaternion>()].copy_from_slice(bytemuck::bytes_of(&Quaternion::default()));
+        return;
+    }
+    schema.fields.iter().for_each(|field| level_value(&field.kind, &mut bytes[field.offset..]));
+}
+
+fn level_value(kind: &Kind, bytes: &mut [u8]) {
+    match kind {
+        Kind::Message(schema) => level_message(schema, bytes),
+        Kind::Array(element, length) => {
+            let size = element.size();
+            (0..*length).for_each(|index| level_value(element, &mut bytes[index * size..]));
+        }
+        Kind::Primitive(_) | Kind::Sequence(..) | Kind::Text | Kind::NamedNumbers(..) => {}
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{Imu, SetPoint};
+    use crate::messages::{Imu, PlantState, Pose, SetPoint};
 
     #[derive(bus::InputPorts)]
     struct Two<'a> {
@@ -86,6 +119,22 @@ mod tests {
         assert_eq!(inputs.first.altitude, 2.0);
         assert_eq!(inputs.second.map(|set_point| set_point.altitude), Some(2.0));
         assert!(inputs.imu.is_none());
+    }
+
+    #[derive(bus::InputPorts)]
+    struct Attitudes<'a> {
+        state: &'a PlantState,
+        pose: &'a Pose,
+    }
+
+    #[test]
+    fn a_port_without_a_message_has_level_attitudes() {
+        let mut memory = InputMemory::default();
+        let Attitudes { state, pose } = InputMessages::default().read(&mut memory);
+        assert_eq!(state.attitude, Quaternion::default());
+        assert_eq!([state.position.x, state.angular_velocity.z], [0.0; 2]);
+        let Orientation { x, y, z, w } = pose.orientation;
+        assert_eq!([x, y, z, w], [0.0, 0.0, 0.0, 1.0]);
     }
 
     #[test]

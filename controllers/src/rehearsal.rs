@@ -85,7 +85,7 @@ fn motions() -> [MotionEstimate; 3] {
 }
 
 /// Messages of a flight with `motion`: a set point, and a reference at rest at the origin. Other inputs that a law needs
-/// are zero.
+/// are zero, and their attitudes level.
 fn messages(motion: &MotionEstimate) -> InputMessages {
     let set_point = SetPoint { altitude: 1.5, roll: 0.1, pitch: -0.1, yaw: 0.5, ..SetPoint::default() };
     InputMessages::default()
@@ -151,7 +151,7 @@ mod tests {
     use crate::pid_gains::PidGains;
     use bus::component::Info;
     use bus::context::Warning;
-    use bus::messages::{Battery, Gps};
+    use bus::messages::{Battery, Gps, PlantState, Quaternion};
     use std::path::Path;
     use vehicles::Vehicle;
 
@@ -243,5 +243,48 @@ mod tests {
     fn a_law_with_ports_of_its_own_is_rehearsed_on_zeros_where_it_needs_a_message() {
         let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
         assert_eq!(check(&BatteryLaw, &hummingbird(|_| {}), &run), Ok(()));
+    }
+
+    /// An input with an attitude that no other law has.
+    #[derive(Debug, bus::InputPorts)]
+    struct TruthInputs<'a> {
+        state: &'a PlantState,
+    }
+
+    /// A law that normalises the attitude of its input.
+    struct TruthLaw;
+
+    impl Law for TruthLaw {
+        const INFO: Info = Info::new("truth", "a law that reads the true state");
+        type Parameters = FileParameters;
+        type Inputs<'a> = TruthInputs<'a>;
+        type State = PidState;
+
+        fn vehicle(parameters: &FileParameters) -> &Path {
+            &parameters.vehicle
+        }
+
+        fn new(_: &FileParameters, _: &LawContext<'_>) -> Result<Self, ParameterError> {
+            Ok(Self)
+        }
+
+        fn start(&self, _: Option<&Predecessor<'_, PidState>>, _: &TruthInputs<'_>) -> PidState {
+            PidState::default()
+        }
+
+        fn step(&self, _: &mut PidState, _: &RotorWrench, inputs: &TruthInputs<'_>) -> ControlOutput {
+            let Quaternion { x, y, z, w } = inputs.state.attitude;
+            let thrust_N = w / (x * x + y * y + z * z + w * w);
+            ControlOutput {
+                wrench: RotorWrench { thrust_N, ..RotorWrench::default() },
+                ..ControlOutput::default()
+            }
+        }
+    }
+
+    #[test]
+    fn a_law_that_needs_an_attitude_is_rehearsed_on_a_level_one() {
+        let run = NodeContext::new("node", &[]).timed(1_000_000, 1, 1000);
+        assert_eq!(check(&TruthLaw, &hummingbird(|_| {}), &run), Ok(()));
     }
 }
