@@ -96,13 +96,13 @@ pub struct GrantWriter {
 }
 
 impl GrantWriter {
-    /// Creates the clock's file in `run_dir`.
+    /// Creates the clock's file in `run_dir`; the ticks before the first of `plan` are not granted.
     ///
     /// # Errors
     /// If the file cannot be created or its space not be reserved.
     pub fn create(run_dir: &Path, plan: &Plan) -> Result<Self, BusError> {
         let records = RecordWriter::create(path(run_dir, "clock", 0), GRANT_WORDS, plan.duration_ticks)?;
-        Ok(Self { records, granted: 0 })
+        Ok(Self { records, granted: plan.first_tick })
     }
 
     /// Notes that the ticks before `end_tick` are granted now; `deadline_ns` is when they were due.
@@ -380,6 +380,17 @@ mod tests {
         assert_eq!(granted, [100, 100, 120, 120, 130, 130]);
         assert_eq!(reader.of(4).unwrap().deadline_ns, Some(115));
         assert_eq!(reader.of(30), None);
+    }
+
+    #[test]
+    fn the_first_grant_of_a_run_from_a_checkpoint_begins_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = Plan { first_tick: 10, ..plan(1) };
+        let mut writer = GrantWriter::create(folder.path(), &plan).unwrap();
+        writer.grant_at(14, None, 100);
+        let reader = GrantReader::open(folder.path()).unwrap();
+        let granted: Vec<_> = reader.grants().map(|grant| (grant.first_tick, grant.end_tick)).collect();
+        assert_eq!(granted, [(10, 14)]);
     }
 
     #[test]

@@ -189,9 +189,11 @@ impl Writer<'_> {
         Ok(Found { tick: found.tick(), path, graph })
     }
 
-    /// The graph of the run again, from `checkpoint` on; a shadow that the manifest does not name flies again.
+    /// The graph of the run again, from `checkpoint` on; a shadow that the manifest does not name flies again. A run that is
+    /// profiled stays so.
     fn from(&self, checkpoint: &Checkpoint) -> Result<Graph> {
         let mut again = Graph::build_from(self.manifest, self.graph.files.branch())?;
+        again.plan.profile = self.graph.plan.profile;
         for backup in &self.graph.backups {
             let is_named = again.backups.iter().any(|other| other.node == backup.node);
             if backup.take_over_tick.is_none() && !is_named {

@@ -106,6 +106,43 @@ fn a_run_that_went_back_is_judged_as_a_whole() {
     assert!(ticks.starts_with(&[500, 1000, 1500, 2000]), "{ticks:?}");
 }
 
+/// Each tick is in the profile once: those of the flight that was left are not.
+#[test]
+fn a_profile_of_a_run_that_went_back_begins_there() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let (record, trace) = (place.path("a.mcap"), place.path("trace.json"));
+    let args =
+        ["profile", &hover, "--record", &record, "--trace", &trace, "--checkpoint-every", "100ms", "--json"];
+    let mut launch = place.start_endless(&args);
+    launch.await_ticks(350);
+    let run = place.run_id();
+    ctl(&place, &run, &["pause"]);
+    assert_eq!(ctl(&place, &run, &["rewind", "200"])["tick"], 200);
+    ctl(&place, &run, &["step", "50"]);
+    ctl(&place, &run, &["stop"]);
+    let summary = launch.end().with_code(1).json();
+    let (ticks, profile) = (summary["ticks"].as_u64().unwrap(), &summary["profile"]);
+    assert!(ticks >= 50, "{summary}");
+    assert_eq!((&profile["first_tick"], &summary["rewinds"][0]["to_tick"]), (&200.into(), &200.into()));
+    let plant = profile["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "plant").unwrap();
+    assert_eq!(plant["compute"]["count"], ticks, "{plant}");
+    let trace = fs::read_to_string(trace).unwrap();
+    assert!(trace.contains("\"tick 200\"") && !trace.contains("\"tick 199\""), "the trace has other ticks");
+}
+
+#[test]
+fn a_profile_from_a_checkpoint_says_where_it_begins() {
+    let place = Place::new();
+    let hover = repository("manifests/hover.toml");
+    let (record, short) = (place.path("a.mcap"), "run.duration_s=0.3");
+    let args = ["run", &hover, "--record", &record, "--checkpoint-every", "200ms", "--set", short];
+    place.call(&[&args[..], &["--in-process"]].concat()).flown();
+    let file = place.path("a.200.ckpt");
+    let ended = place.call(&["profile", "--from", &file, "--record", &place.path("b.mcap"), "--set", short]);
+    ended.flown().prints(&["profiled from tick 200 on"]);
+}
+
 #[test]
 fn a_checkpoint_of_another_run_is_refused() {
     let place = Place::new();

@@ -270,7 +270,7 @@ fn a_live_swap_to_a_sensor_with_new_measurements_at_other_ticks_is_warned_of() {
     ended.says(&told);
     let answer = ended.json();
     assert!(answer["warnings"][0].as_str().unwrap().contains("as before"), "{answer}");
-    launch.end().flown();
+    launch.end().with_code(1);
 }
 
 /// The last measurement of its gps arrives at tick 1480.

@@ -22,6 +22,8 @@ use std::path::Path;
 /// ```
 #[derive(Debug, Serialize)]
 pub struct Profile {
+    /// The first tick that was profiled: that of the checkpoint from which the run went on, also after a rewind.
+    pub(super) first_tick: u32,
     ticks: u32,
     /// Computations whose times were noted, over all nodes.
     noted: usize,
@@ -43,6 +45,7 @@ impl Profile {
         let (nodes, transport) = latencies(flight);
         let measured = recording.and_then(|path| Measured::read(flight, path).ok());
         Self {
+            first_tick: flight.plan.first_tick,
             ticks: flight.ticks,
             noted: flight.noted(),
             left_out: flight.left_out(),

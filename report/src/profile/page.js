@@ -107,6 +107,7 @@ function drawDeadlines() {
 title(`${data.run}: where the time of a tick goes`);
 element("summary").textContent = `${profile.ticks.toLocaleString("en")} ticks, ` +
   `${profile.noted.toLocaleString("en")} computations profiled` +
+  (profile.first_tick ? ` from tick ${profile.first_tick.toLocaleString("en")} on` : "") +
   (profile.left_out ? `, ${profile.left_out.toLocaleString("en")} not profiled because there were too many.` : ".");
 drawSlowest();
 drawPath();

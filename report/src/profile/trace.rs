@@ -29,9 +29,10 @@ impl Profile {
         let room = COMPUTATIONS_MAX / flight.plan.nodes.len().max(1);
         let slowest = self.critical_path.slowest(SLOWEST_TICKS.min(room / 6));
         let room = u32::try_from(room - 3 * slowest.len()).unwrap_or(u32::MAX);
-        let first = FIRST_TICKS.min(room).min(flight.ticks);
+        let begin = flight.plan.first_tick;
+        let first = FIRST_TICKS.min(room).min(flight.ticks.saturating_sub(begin));
         let around = slowest.iter().flat_map(|&tick| tick.saturating_sub(1)..=tick.saturating_add(1));
-        let ticks = (0..first).chain(around.filter(|&tick| tick < flight.ticks)).collect();
+        let ticks = (begin..begin + first).chain(around.filter(|&tick| tick < flight.ticks)).collect();
         let origin_ns = origin_ns(flight, &ticks);
         Trace { flight, ticks: &ticks, origin_ns, flows: 0, separator: "", out }.write()?;
         Ok(format!("the first {first} ticks and around the {} slowest", slowest.len()))

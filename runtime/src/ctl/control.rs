@@ -4,7 +4,7 @@ use crate::checkpoint_writer::{Found, Writer};
 use crate::ctl::protocol::{Answer, Request, Status};
 use crate::ctl::server::{Asked, Remote, Reply, Server};
 use crate::rewind::{Rewind, Rewinds};
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use bus::lockstep::SupervisorView;
 use bus::membership::Membership;
 use bus::plan::Plan;
@@ -209,9 +209,6 @@ impl<'a> ControlServer<'a> {
         let paused_at = self.control.held_at().filter(|held| self.control.hold_tick() <= *held);
         let found = paused_at.context("the run is not paused: pause it first, with `hummingbus ctl pause`");
         let found = found.and_then(|now| {
-            if self.plan.profile {
-                bail!("a profile has each tick once: fly without it to go back");
-            }
             self.rewinds.require_place()?;
             Ok((now, self.checkpoints.find(tick, file, now)?))
         });
