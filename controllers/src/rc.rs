@@ -10,9 +10,10 @@ use bus::{Bounded, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, refuse, require};
 use inputs::InputFiles;
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use vehicles::table::{Dialect, Table, TableError, names, shown};
+use vehicles::table::{Dialect, Row, Table, TableError, names, shown};
 
 /// Number of the throttle's channel, from 1.
 const THROTTLE: usize = 3;
@@ -221,25 +222,83 @@ struct Recording {
     /// Numbers of the channels, from 1.
     channels: Vec<usize>,
     times_s: Vec<f64>,
-    /// Pulses of each row, in the order of `channels`.
+    /// Pulses of each of `channels`, row by row.
     pulses_us: Vec<Vec<f64>>,
+}
+
+/// The file of a recording, and its table.
+struct Source<'a> {
+    file: &'a str,
+    table: &'a Table,
+}
+
+impl Source<'_> {
+    /// Refuses the first row of another length than the header's.
+    fn require_lengths(&self) -> Result<(), ParameterError> {
+        let expected = self.table.headers.len();
+        let Some(row) = self.table.rows.iter().find(|row| row.len() != expected) else { return Ok(()) };
+        let (line, found) = (row.line, row.len());
+        let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
+        Err(refused(self.file, fault))
+    }
+
+    /// The rows that are as long as the header: others are refused for their length.
+    fn whole_rows(&self) -> impl Iterator<Item = Row<'_>> {
+        self.table.rows.iter().filter(|row| row.len() == self.table.headers.len())
+    }
+
+    /// Times, which have to grow, of the column `place`.
+    fn times_s(&self, place: usize) -> Result<Vec<f64>, ParameterError> {
+        let mut before_s = f64::NEG_INFINITY;
+        let time_s = |row: Row<'_>| -> Result<f64, ParameterError> {
+            let is_later = |time_s: f64| time_s.is_finite() && time_s > before_s;
+            before_s = self.number(row, place, is_later, "a time after the row before")?;
+            Ok(before_s)
+        };
+        self.whole_rows().map(time_s).collect()
+    }
+
+    /// Pulses of the column `place`.
+    fn pulses_us(&self, place: usize) -> Result<Vec<f64>, ParameterError> {
+        let is_pulse = |pulse_us: f64| PULSES_US.contains(&pulse_us);
+        self.whole_rows().map(|row| self.number(row, place, is_pulse, "pulses of 800 to 2200 µs")).collect()
+    }
+
+    fn number(
+        &self,
+        row: Row<'_>,
+        place: usize,
+        is_valid: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<f64, ParameterError> {
+        let cell = row.cell(place);
+        self.table.number(cell).filter(|number| is_valid(*number)).ok_or_else(|| {
+            let (line, column, found) = (row.line, &self.table.headers[place], shown(cell));
+            let fault = format_args!(":{line}: column `{column}`: expected {expected}, found \"{found}\"");
+            refused(self.file, fault)
+        })
+    }
+}
+
+/// Returns the error that the recording `file` has `fault`, which stands behind its name.
+fn refused(file: &str, fault: impl Display) -> ParameterError {
+    ParameterError::conflict("data", format_args!("{file}{fault}"))
 }
 
 impl Recording {
     fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
-        let file = path.display();
-        let refused = |fault: String| ParameterError::conflict("data", format!("{file}{fault}"));
+        let file = path.display().to_string();
         let bytes = files
             .bytes(path)
-            .map_err(|cause| refused(format!(": cannot read it: {cause}; check the path")))?;
-        Self::read(&bytes).map_err(refused)
+            .map_err(|cause| refused(&file, format_args!(": cannot read it: {cause}; check the path")))?;
+        Self::read(&file, &bytes)
     }
 
-    fn read(bytes: &[u8]) -> Result<Self, String> {
+    fn read(file: &str, bytes: &[u8]) -> Result<Self, ParameterError> {
         let known: Vec<String> = (1..=RC_CHANNELS_MAX).map(|channel| format!("ch{channel}")).collect();
         let wanted: Vec<&str> = std::iter::once("time_s").chain(known.iter().map(String::as_str)).collect();
         let table = Table::parse(bytes, &wanted, &Dialect::default())
-            .map_err(|cause| format!(": {}", without_keys(&cause)))?;
+            .map_err(|cause| refused(file, format_args!(": {}", without_keys(&cause))))?;
         let place = |(index, name): (usize, &String)| Some((index + 1, table.column(name).ok()?));
         let places: Vec<(usize, usize)> = known.iter().enumerate().filter_map(place).collect();
         let line = table.header_line.unwrap_or(1);
@@ -247,47 +306,21 @@ impl Recording {
         let is_whole = !places.is_empty() && places.len() + 1 == table.headers.len();
         let Some(time) = time.filter(|_| is_whole) else {
             let found = names(&table.headers);
-            return Err(format!(
-                ":{line}: expected the columns time_s and ch1 to ch{RC_CHANNELS_MAX}, each once, found {found}"
+            return Err(refused(
+                file,
+                format_args!(
+                    ":{line}: expected the columns time_s and ch1 to ch{RC_CHANNELS_MAX}, each once, found {found}"
+                ),
             ));
         };
-        let mut read = Self {
-            channels: places.iter().map(|(channel, _)| *channel).collect(),
-            times_s: Vec::new(),
-            pulses_us: Vec::new(),
-        };
-        for row in table.rows.iter() {
-            let number = |place: usize, is_valid: &dyn Fn(f64) -> bool, expected: &str| {
-                let cell = row.cell(place);
-                table.number(cell).filter(|number| is_valid(*number)).ok_or_else(|| {
-                    let column = &table.headers[place];
-                    format!(
-                        ":{}: column `{column}`: expected {expected}, found \"{}\"",
-                        row.line,
-                        shown(cell)
-                    )
-                })
-            };
-            if row.len() != table.headers.len() {
-                let (expected, found) = (table.headers.len(), row.len());
-                return Err(format!(
-                    ":{}: expected {expected} cells as in the header, found {found}",
-                    row.line
-                ));
-            }
-            let before = read.times_s.last().copied().unwrap_or(f64::NEG_INFINITY);
-            let is_later = |time_s: f64| time_s.is_finite() && time_s > before;
-            read.times_s.push(number(time, &is_later, "a time after the row before")?);
-            let is_pulse = |pulse_us: f64| PULSES_US.contains(&pulse_us);
-            let pulses =
-                places.iter().map(|(_, place)| number(*place, &is_pulse, "pulses of 800 to 2200 µs"));
-            read.pulses_us.push(pulses.collect::<Result<_, _>>()?);
+        if table.rows.is_empty() {
+            return Err(refused(file, ": expected at least one row, found none"));
         }
-        if read.times_s.is_empty() {
-            Err(": expected at least one row, found none".to_owned())
-        } else {
-            Ok(read)
-        }
+        let source = Source { file, table: &table };
+        let pulses = ParameterError::gather(places.iter().map(|(_, place)| source.pulses_us(*place)));
+        let columns = ParameterError::both(source.times_s(time), pulses);
+        let ((), (times_s, pulses_us)) = ParameterError::both(source.require_lengths(), columns)?;
+        Ok(Self { channels: places.iter().map(|(channel, _)| *channel).collect(), times_s, pulses_us })
     }
 
     /// Refuses a start behind the end of the recording, and warns of a run that is longer.
@@ -320,7 +353,7 @@ impl Recording {
 
     fn pulse_us(&self, row: usize, channel: usize) -> Option<f64> {
         let place = self.channels.iter().position(|known| *known == channel)?;
-        Some(self.pulses_us[row][place])
+        Some(self.pulses_us[place][row])
     }
 }
 
@@ -370,7 +403,7 @@ mod tests {
     fn data_that_begins_late_is_warned_of() {
         let told = |text: &str, from_s: f64| {
             let context = NodeContext::new("rc", &[]).timed(1_000_000, 1, 1000);
-            Recording::read(text.as_bytes()).unwrap().check_times(from_s, &context).unwrap();
+            Recording::read("rc.csv", text.as_bytes()).unwrap().check_times(from_s, &context).unwrap();
             context.into_warnings().into_iter().map(|warning| warning.message).collect::<Vec<_>>()
         };
         let text = "time_s,ch1\n3,1500\n9,1600\n";
@@ -405,7 +438,8 @@ mod tests {
 
     #[test]
     fn pulses_of_a_receiver_hold_from_row_to_row() {
-        let read = Recording::read(b"time_s,ch1,ch5\n1,1500,1000\n1.02,1600,2000\n").unwrap();
+        let text = b"time_s,ch1,ch5\n1,1500,1000\n1.02,1600,2000\n";
+        let read = Recording::read("rc.csv", text).unwrap();
         let pulses = |time_s| [1, 5, 2].map(|channel| read.pulse_us(read.row(time_s), channel));
         assert_eq!(pulses(0.0), [Some(1500.0), Some(1000.0), None]);
         assert_eq!(pulses(1.019), [Some(1500.0), Some(1000.0), None]);
@@ -415,11 +449,14 @@ mod tests {
 
     #[test]
     fn values_that_no_receiver_sends_are_refused_with_their_place() {
-        let refused = |text: &str| Recording::read(text.as_bytes()).unwrap_err();
+        let refused = |text: &str| Recording::read("rc.csv", text.as_bytes()).unwrap_err().to_string();
         assert!(refused("time_s,ch1\n0,1500\n0,1500\n").contains(":3: column `time_s`"));
         assert!(refused("time_s,ch1\n0,15\n").contains("column `ch1`: expected pulses of 800 to 2200 µs"));
         assert!(refused("time_s,ch1,roll\n0,1500,1\n").contains("ch1 to ch16"));
         assert!(refused("time_s,ch1\n").contains("at least one row"));
+        let all = refused("time_s,ch1,ch2\n0,15,1500\n0,1500,x\n1,15,1500\n2,1500\n");
+        let parts = [":5: expected 3 cells", ":3: column `time_s`", ":2: column `ch1`", ":3: column `ch2`"];
+        assert!(parts.iter().all(|part| all.contains(part)) && all.lines().count() == 4, "{all}");
         for text in ["ch1,ch2\n1500,1500\n", "1500,1500\n1500,1500\n", "time,ch1\n0,1500\n"] {
             let fault = refused(text);
             assert!(fault.contains("time_s") && !fault.contains("csv."), "{fault}");

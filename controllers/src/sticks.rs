@@ -90,7 +90,7 @@ impl Sticks {
         let source = Source { file, table: &table, places };
         let mut rows: Vec<Row> = Vec::new();
         for row in table.rows.iter() {
-            rows.push(source.row(row, rows.last())?);
+            rows.push(source.row(row, rows.last()).map_err(|first| source.faults(first))?);
         }
         if rows.is_empty() {
             return Err(refused(file, ": expected at least one row of sticks, found none"));
@@ -160,13 +160,35 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    fn row(&self, cells: table::Row<'_>, before: Option<&Row>) -> Result<Row, ParameterError> {
+    /// The faults of all rows, of which `first` is one: the first row of another length than the header's, the first time that is not
+    /// after the row before, and the first faulty cell of each column.
+    fn faults(&self, first: ParameterError) -> ParameterError {
+        let rows = self.table.rows.iter();
+        let whole = || rows.clone().filter(|cells| self.require_length(*cells).is_ok());
+        let length = rows.clone().find_map(|cells| self.require_length(cells).err());
+        let mut before_s = f64::NEG_INFINITY;
+        let time = whole().find_map(|cells| {
+            let time_s = self.number(cells, 0).ok()?;
+            let is_later = time_s > std::mem::replace(&mut before_s, time_s);
+            (!is_later).then(|| self.value(cells, 0, "a time after the row before", time_s))
+        });
+        let cell = |column| whole().find_map(|cells| self.number(cells, column).err());
+        let mut faults = length.into_iter().chain(time).chain((0..COLUMNS.len()).filter_map(cell));
+        faults.next().map_or(first, |one| one.and(faults))
+    }
+
+    fn require_length(&self, cells: table::Row<'_>) -> Result<(), ParameterError> {
         let (expected, found) = (self.table.headers.len(), cells.len());
-        if found != expected {
-            let line = cells.line;
-            let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
-            return Err(refused(self.file, fault));
+        if found == expected {
+            return Ok(());
         }
+        let line = cells.line;
+        let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
+        Err(refused(self.file, fault))
+    }
+
+    fn row(&self, cells: table::Row<'_>, before: Option<&Row>) -> Result<Row, ParameterError> {
+        self.require_length(cells)?;
         let number = |column: usize| self.number(cells, column);
         let time_s = number(0)?;
         if before.is_some_and(|before| before.time_s >= time_s) {
@@ -260,6 +282,9 @@ mod tests {
             ),
             (header.to_owned(), "expected at least one row"),
             (format!("{header}0,1\n"), "s.csv:2: expected 3 cells as in the header, found 2"),
+            (format!("{header}0,x,2\n1,1\n1,1,nan\n"), "s.csv:3: expected 3 cells as in the header, found 2"),
+            (format!("{header}0,x,2\n1,1\n1,1,nan\n"), "s.csv:2: column `roll_deg`"),
+            (format!("{header}0,x,2\n1,1\n1,1,nan\n"), "s.csv:4: column `pitch_deg`"),
             ("0,1,2\n1,1,2\n".to_owned(), "line 1: expected a header"),
             (
                 "\u{feff}# mine\ntime_s;roll_deg;pitch_deg\n0,5;1;x\n".to_owned(),

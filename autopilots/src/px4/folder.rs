@@ -80,7 +80,7 @@ impl Build {
         });
         names.extend(airframe.as_ref().ok().cloned());
         let read = |path: &Path| context.files.bytes(path).map_err(|error| unread(path, error));
-        let script = |name: PathBuf| {
+        let script = |name: PathBuf| -> Result<_, ParameterError> {
             let bytes = read(&folder.join(&name))?;
             Ok((name, bytes.to_vec()))
         };
