@@ -147,6 +147,19 @@ fn all_contradictions_of_a_process_are_told() {
 }
 
 #[test]
+fn all_faults_of_a_room_are_told() {
+    let odometry = format!(
+        "\n[process.range]\nkind = \"range\"\nscene = {:?}\nperiod_ticks = 10\ninputs.state = \"/plant/state\"\n\
+         [process.attitude]\nkind = \"attitude\"\ninputs.imu = \"/imu/imu\"\n\
+         [process.odometry]\nkind = \"range-inertial\"\n\
+         inputs = {{ ranges = \"/range/ranges\", imu = \"/imu/imu\", attitude = \"/attitude/estimate\" }}\n\
+         parameters = {{ room_m = [4.0, 4.0], start_in_room_m = [-1.0, 5.0] }}\n",
+        repository("scenes/room.toml")
+    );
+    told(&(with(&[]) + &odometry), &["`room_m.1` must be", "`start_in_room_m.0` must be"]);
+}
+
+#[test]
 fn a_number_out_of_all_range_hides_no_fault_of_a_file() {
     let place = Place::new();
     let hummingbird = repository("vehicles/hummingbird.toml");
