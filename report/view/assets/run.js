@@ -131,8 +131,9 @@ export class RunControls {
     try {
       const answer = await ask(request);
       const isDone = answer.answer === "done";
+      const done = [answer.text, ...(answer.warnings ?? [])].join("; warning: ");
       // A later request has the place by now.
-      if (number === this.asking || !isDone) say(isDone ? answer.text : `Refused: ${answer.reason}`, !isDone);
+      if (number === this.asking || !isDone) say(isDone ? done : `Refused: ${answer.reason}`, !isDone);
       // The news of the end may have come before.
       if (isDone && request.request === "swap") this.#markSwap(request, answer);
       if (isDone) this.#sayEnd();
