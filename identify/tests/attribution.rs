@@ -1,14 +1,19 @@
 //! Flights with an effect that nobody declared: it is named, and nothing else is. The whole table is made by
 //! `cargo run --release -p hummingbus-identify --example confusion`, see docs/validation.md.
 use crate::simulated;
-use crate::skipped::{cases, first, is_thorough};
+use crate::skipped::{cases, first, is_left, is_thorough};
 use identify::run::identify;
+use identify::steps::SENSOR_BIAS;
 use rayon::prelude::*;
 use simulated::cases::{Case, EFFECTS, Judgement};
 use std::collections::BTreeSet;
 
 /// Long enough to tell effects apart, short enough for many of them.
 const DURATION_S: f64 = 8.0;
+
+/// The effects that quick tests take: two of the motors and their battery, and one of air, body, sensors and rig each.
+const QUICK: [&str; 6] =
+    ["rotor-drag", "command-delay", "battery-sag", "inertia-error", SENSOR_BIAS, "gimbal-friction"];
 
 /// A case flown with slower pose samples than the default, which makes the grid coarser and the test faster.
 fn judged(mut case: Case) -> Judgement {
@@ -27,10 +32,10 @@ fn require_right(what: &str, judgement: &Judgement) {
     );
 }
 
-/// Every effect at its plausible strength, one test a third so that they run side by side. Quick tests take every other one.
+/// Every effect at its plausible strength, one test a third so that they run side by side. Quick tests take those of [`QUICK`].
 fn require_every(third: usize) {
     let numbered = EFFECTS.into_iter().enumerate().filter(|(number, _)| number % 3 == third);
-    let numbered = cases("effects", numbered, |(number, _)| number / 3 % 2 == 0);
+    let numbered = cases("effects", numbered, |(_, name)| QUICK.contains(name));
     let flown: Vec<(&str, Judgement)> = numbered
         .into_par_iter()
         .map(|(number, name)| (name, judged(Case::of(&[name], 1.0, 700 + number as u64, DURATION_S))))
@@ -72,6 +77,9 @@ fn two_effects_at_once_are_both_named() {
 /// Each alone takes half of the squares away, but makes those blocks worse in which the other acts.
 #[test]
 fn two_effects_that_hide_each_other_are_both_named() {
+    if is_left("`two_effects_at_once_are_both_named` has a pair") {
+        return;
+    }
     let pair = ["thrust-scale", "translational-lift"];
     require_right(&pair.join(" + "), &judged(Case::of(&pair, 1.0, 10_603, 12.0)));
 }
@@ -99,7 +107,7 @@ fn rotors_without_angular_momentum_are_named_and_hide_no_mass() {
         );
         rotors.value
     };
-    let seeds = first(2, "seeds", 0..6_u64);
+    let seeds = first(1, "seeds", 0..6_u64);
     let values: Vec<f64> = seeds.into_par_iter().map(|seed| of_seed(4200 + seed)).collect();
     assert!(
         values.contains(&-1.0) || !is_thorough(),

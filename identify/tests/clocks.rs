@@ -24,7 +24,7 @@ fn offsets(seed: u64, late_s: f64) -> Vec<[f64; 4]> {
 
 #[test]
 fn intervals_hold_the_truth_and_flights_that_were_measured_right_are_not_shifted() {
-    for late_s in cases("delays", [0.0, 0.003, 0.0124], |late_s| *late_s != 0.003) {
+    for late_s in cases("delays", [0.0, 0.003, 0.0124], |late_s| *late_s > 0.01) {
         let found: Vec<[f64; 4]> =
             (0..SEEDS).into_par_iter().flat_map_iter(|seed| offsets(9000 + seed, late_s)).collect();
         assert_eq!(found.len(), 2 * SEEDS as usize);

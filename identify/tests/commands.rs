@@ -1,6 +1,6 @@
 //! Commands that were not logged all the time, and flights whose commands or motion are missing.
 use crate::simulated;
-use crate::skipped::cases;
+use crate::skipped::is_left;
 use flights::{Channel, Flight, FlightSet};
 use identify::report::{Estimate, Report};
 use identify::run::identify;
@@ -68,6 +68,9 @@ fn a_gap_of_the_commands_is_not_compared() {
 
 #[test]
 fn drop_outs_of_all_channels_are_not_compared() {
+    if is_left("`a_gap_of_the_commands_is_not_compared` has a gap") {
+        return;
+    }
     let is_logged = |_: usize, t: f64| (t + 0.3) % 2.0 < 1.6;
     require_mass(&found(&changed(&heavy(20.0), |flight| keep_all(flight, is_logged))));
 }
@@ -121,6 +124,9 @@ fn commands_that_are_written_on_change_hold_until_the_next() {
     let holding = found(&written(true));
     let compared = |report: &Report| report.flights.iter().map(|flight| flight.compared_s).sum::<f64>();
     assert!(compared(&holding) > 35.0, "{holding}");
+    if is_left("`commands_far_apart_are_refused` has no `on_change` either") {
+        return;
+    }
     let without_key = identify(&written(false), &mut |_| ()).map(|outcome| compared(&outcome.report));
     assert!(without_key.as_ref().map_or(true, |compared_s| *compared_s < 25.0), "{without_key:?}");
 }
@@ -144,10 +150,13 @@ fn commands_that_a_finer_table_holds_are_slow() {
         let mut notes = report.flights.iter().flat_map(|flight| &flight.notes);
         notes.any(|note| note.contains("command: logged every 0.050 s"))
     };
+    assert!(!slow(&found(&held(8.0, true))));
+    if is_left("`commands_slower_than_the_motors_determine_no_lag_delay_or_inertia` has slow ones, too") {
+        return;
+    }
     let report = found(&held(20.0, false));
     assert!(slow(&report), "{report}");
     require_mass_or_rival(&report);
-    assert!(!slow(&found(&held(8.0, true))));
 }
 
 /// Long flights with fewer samples of the pose, which are fitted in half of the time.
@@ -197,11 +206,14 @@ fn require_factor(text: &str, factor: f64) {
 /// A range that is declared twice as wide, and commands that are half as large.
 #[test]
 fn commands_of_half_a_range_are_told_with_the_factor() {
+    assert!(!found(&heavy(8.0).flights()).to_string().contains("the thrust of the commands is"));
+    if is_left("`commands_of_another_range_are_not_described` has a factor") {
+        return;
+    }
     let half = changed(&coarse(), |flight| {
         flight.command.values.iter_mut().flatten().for_each(|command| *command *= 0.5);
     });
     require_factor(&found(&half).to_string(), 2.0);
-    assert!(!found(&heavy(8.0).flights()).to_string().contains("the thrust of the commands is"));
 }
 
 /// A change that makes a flight unusable.
@@ -329,7 +341,10 @@ fn commands_far_apart_are_refused() {
 /// Some of the commands of a controller at 500 Hz: they act late by half of the period, which is not an effect.
 #[test]
 fn what_the_logging_of_commands_makes_is_not_named() {
-    for every in cases("periods", [5, 20], |every| *every == 20) {
+    if is_left("`commands_slower_than_the_motors_determine_no_lag_delay_or_inertia` has slow commands") {
+        return;
+    }
+    for every in [5, 20] {
         let set = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(every)));
         let report = found(&set);
         require_mass(&report);
@@ -341,6 +356,9 @@ fn what_the_logging_of_commands_makes_is_not_named() {
 /// The interval of a delay holds the truth even if every fifth command was logged.
 #[test]
 fn the_interval_of_a_delay_holds_half_of_the_logging_period() {
+    if is_left("`the_riddle_of_the_late_rig_is_solved` has a delay, `coverage` has intervals") {
+        return;
+    }
     let mut case = heavy(20.0);
     case.plan.truth = vec![simulated::effect("command-delay", &[("delay", 0.02)])];
     let set = changed(&case, |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(5)));

@@ -1,11 +1,14 @@
 //! 95 % intervals hold the truth as often as they say, of the effects that are true, without a selection.
 use crate::simulated;
+use crate::skipped::first;
 use identify::effect_reports::estimates;
 use identify::run::problem;
 use rayon::prelude::*;
 use simulated::cases::Case;
 
 const CASES: u64 = 200;
+/// Cases that quick tests take. At a true rate of 95 % fewer than 90 of 100 hold once in 35 times; the seeds are fixed.
+const QUICK_CASES: usize = 100;
 const DURATION_S: f64 = 8.0;
 
 /// Tells for each parameter of the true effects whether its interval holds the truth, in the case of one seed.
@@ -33,8 +36,8 @@ fn holds(seed: u64) -> Vec<(&'static str, bool)> {
 
 #[test]
 fn intervals_hold_the_truth_at_their_rate() {
-    let all: Vec<(&str, bool)> =
-        (0..CASES).into_par_iter().flat_map_iter(|seed| holds(3000 + seed)).collect();
+    let seeds = first(QUICK_CASES, "seeds", 0..CASES);
+    let all: Vec<(&str, bool)> = seeds.into_par_iter().flat_map_iter(|seed| holds(3000 + seed)).collect();
     for name in ["coefficient", "error"] {
         let held: Vec<bool> =
             all.iter().filter(|(effect, _)| *effect == name).map(|(_, holds)| *holds).collect();

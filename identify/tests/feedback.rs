@@ -14,7 +14,7 @@ fn some() -> Vec<(u64, Gust)> {
 
 #[test]
 fn the_interval_of_the_inertia_holds_the_truth_beside_slow_disturbances() {
-    for error in [0.0, 0.25, -0.1] {
+    for error in cases("inertias", [0.0, 0.25, -0.1], |error| *error > 0.0) {
         let found: Vec<(f64, f64, f64)> =
             some().par_iter().flat_map_iter(|(seed, gust)| fitted(gust, error, *seed).inertia).collect();
         let held = found.iter().filter(|(_, low, high)| *low <= error && error <= *high).count();
@@ -28,7 +28,8 @@ fn the_interval_of_the_inertia_holds_the_truth_beside_slow_disturbances() {
 
 #[test]
 fn no_inertia_is_named_for_a_disturbance_that_the_controller_answers() {
-    let taken = cases("disturbances", some(), |(seed, _)| seed % 3 == 0);
+    // A slow one of a hover and a fast one of a course.
+    let taken = cases("disturbances", some(), |(seed, _)| [SEED + 26, SEED + 47].contains(seed));
     let named: Vec<(Gust, Vec<&str>)> = taken
         .par_iter()
         .map(|(seed, gust)| (*gust, searched(gust, 0.0, *seed).verdict))

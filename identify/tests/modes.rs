@@ -1,5 +1,6 @@
 //! Variations of the logging: channels left out, slow, held, late, broken.
 use crate::simulated;
+use crate::skipped;
 use flights::{Channel, Flight, FlightSet};
 use identify::report::Report;
 use identify::run::identify;
@@ -307,6 +308,9 @@ fn the_riddle_of_the_late_rig_is_solved() {
 /// The speeds of the rotors at the first sample, and the commands before it, are unknown.
 #[test]
 fn a_log_may_begin_in_mid_flight() {
+    if skipped::is_left("`the_riddle_of_the_late_rig_is_solved` has the whole log") {
+        return;
+    }
     let found = changed(&riddle(), |flight| {
         without_span(&mut flight.command, 0.0, 1.3);
         without_span(&mut flight.attitude, 0.0, 1.3);

@@ -123,8 +123,9 @@ fn push(channel: &mut Channel<ROTORS_MAX>, time_s: f64, values: &[f64; 4]) {
 #[test]
 fn map_lag_delay_and_voltage_lie_in_their_intervals() {
     let mut inside = [0; 5];
-    let cases = 12;
-    for seed in 0..cases {
+    let seeds = skipped::first(8, "seeds", 0..12);
+    let cases = seeds.len() as u64;
+    for seed in seeds {
         let bench = Bench::of(seed);
         let motor = bench.motor();
         let gain = libm::pow(motor.reference_voltage_v.unwrap() / REFERENCE_V, bench.power);
@@ -142,7 +143,7 @@ fn map_lag_delay_and_voltage_lie_in_their_intervals() {
         assert_eq!(motor.comparison.preferred, Order::First);
         assert!(motor.held_out[0].fitted < 0.2 * motor.held_out[0].declared, "{:?}", motor.held_out);
     }
-    assert!(inside.iter().all(|count| *count >= cases - 3), "{inside:?} of {cases}");
+    assert!(inside.iter().all(|count| *count >= cases - cases / 4), "{inside:?} of {cases}");
 }
 
 /// Flights of `truth` with the effects of the air, the last of them held out; `noise` times that of good sensors.

@@ -73,6 +73,19 @@ pub fn quick_or<T>(quick: T, whole: T, what: &str) -> T {
     quick
 }
 
+/// True if the running test leaves the case that follows to `scripts/dev thorough`, which is reported. `why` says which quick
+/// test flies one of its kind.
+#[allow(dead_code, reason = "few crates have heavy tests")]
+#[must_use]
+pub fn is_left(why: &str) -> bool {
+    if is_thorough() {
+        return false;
+    }
+    // As in `leave`, the third word is the number of cases.
+    report(&format!("left out: 1 heavy case of {}: {why}\n", test_name()));
+    true
+}
+
 /// True where `HUMMINGBUS_STEADY` says that nothing else runs on this machine; a skipped test elsewhere. For tests of what
 /// host time decides, such as the silence of a person who flies by hand.
 #[allow(dead_code, reason = "few crates' tests need it")]
