@@ -5,7 +5,7 @@ mod ardupilot;
 mod px4;
 
 use crate::recordings::require_same;
-use crate::skipped::variable_or_skip;
+use crate::skipped::{cases, is_left, variable_or_skip};
 use crate::support::{Ended, Place, repository};
 use serde_json::{Value, json};
 use std::fs;
@@ -206,13 +206,16 @@ fn recorded_channels_fly_the_flight_again() {
 
 #[test]
 fn each_firmware_of_a_run_flies_its_own_vehicle() {
+    if is_left("`px4::each_px4_of_a_run_flies_its_own_vehicle` has several") {
+        return;
+    }
     let place = Place::new();
     each_flies_its_own(&place, &manifest(), &stand_in(&place, ""));
 }
 
 #[test]
 fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
-    let cases: [(&str, &[&str]); 5] = [
+    let all: [(&str, &[&str]); 5] = [
         // While it starts, and in flight: 7 s of its time are before tick 0.
         ("ends 1\n", &["betaflight ended with exit code 3", "out of coffee"]),
         ("ends 8\n", &["betaflight ended with exit code 3", "out of coffee"]),
@@ -220,7 +223,7 @@ fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
         ("mute 8\n", &["it has sent no motor outputs for 0.1 s of its time"]),
         ("hangs 8\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
     ];
-    for (words, told) in cases {
+    for (words, told) in cases("failures", all, |(words, _)| ["ends 1\n", "mute 8\n"].contains(words)) {
         let place = Place::new();
         let mut settings = stand_in(&place, words);
         settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());

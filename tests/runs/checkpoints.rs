@@ -1,10 +1,10 @@
 //! A run that goes on from a checkpoint writes what the run that was never interrupted has written, whoever hosts its
 //! nodes before and after.
 
-use crate::manifests::{is_representative, settings, shipped, shipped_in_folders};
+use crate::manifests::{is_brief, settings, shipped, shipped_in_folders};
 use crate::recordings::{first_tick, rows};
 use crate::refusals::good;
-use crate::skipped::{cases, is_thorough};
+use crate::skipped::{cases, first, is_thorough};
 use crate::support::{Place, poll, repository};
 use rustix::process::Signal;
 use std::fs;
@@ -84,7 +84,7 @@ fn every_shipped_manifest_goes_on_from_random_ticks_under_every_host() {
     let flat = shipped().into_iter().map(|path| (path, DURATION_S, turns));
     let in_folders = shipped_in_folders().into_iter().map(|path| (path, DURATION_IN_FOLDERS_S, 1));
     let all = flat.chain(in_folders).filter(|(path, ..)| !has_backups(path));
-    let taken = cases("manifests", all, |(path, ..)| is_representative(path));
+    let taken = cases("manifests", all, |(path, ..)| is_brief(path));
     let least = taken.len();
     for (number, (manifest, duration_s, turns)) in taken.into_iter().enumerate() {
         let flight = Flight::new(&place, &manifest, duration_s);
@@ -120,7 +120,7 @@ fn every_shipped_manifest_goes_on_from_random_ticks_under_every_host() {
         }
     }
     assert!(
-        least > 20 && (gone_on > 80 || !is_thorough()),
+        if is_thorough() { least > 20 && gone_on > 80 } else { gone_on > 10 },
         "only {gone_on} runs of {least} manifests went on"
     );
 }
@@ -162,9 +162,8 @@ fn what_is_under_way_goes_on() {
         ("sensors", 2101, "run.duration_s=2.3"),
         ("take-off", 1702, "run.duration_s=2.0"),
     ];
-    // Joints and landings go on in other tests, too.
-    let is_quick =
-        |name: &str| ["workshop", "commands-over-a-link", "computing-time", "sensors"].contains(&name);
+    // Contacts, joints, landings and steps that take time go on in other tests, too.
+    let is_quick = |name: &str| ["commands-over-a-link", "sensors"].contains(&name);
     for (name, tick, more) in cases("manifests", flights, |(name, ..)| is_quick(name)) {
         let manifest = repository(&format!("manifests/{name}.toml"));
         require_goes_on_under_every_host(&place, name, &format!("include = [{manifest:?}]\n"), tick, more);
@@ -336,7 +335,7 @@ fn another_law_goes_on_as_a_swap_has_it() {
         "--set",
         &gains,
     ];
-    for host in HOSTS {
+    for host in first(1, "hosts", HOSTS) {
         place.call(&[&args[..], host].concat()).with_code(0);
         require_goes_on(&place, &whole, &fork, 3000);
     }

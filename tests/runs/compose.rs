@@ -78,7 +78,8 @@ fn partitions_of_other_flights_give_the_same_file() {
         ("manifests/figure-eight.toml", 0.5, &[], 15..18),
         ("manifests/swap-laws.toml", 0.9, &EARLY_SWAPS, 18..21),
     ];
-    for (manifest, duration_s, settings, seeds) in flights {
+    let is_quick = |name: &str| !name.contains("figure-eight");
+    for (manifest, duration_s, settings, seeds) in cases("flights", flights, |(name, ..)| is_quick(name)) {
         let what = format!("partitions of {manifest}");
         let compositions = first(1, &what, partitions(manifest, seeds));
         require_same_file(manifest, duration_s, settings, &compositions);
@@ -97,6 +98,7 @@ fn ten_vehicles_give_the_same_file_whole_by_vehicle_and_in_any_partition() {
     let manifest = "manifests/ten-vehicles.toml";
     let mut compositions = partitions(manifest, 21..22);
     compositions.extend(["all".to_owned(), "vehicles".to_owned()]);
+    let compositions = cases("compositions", compositions, |composition| composition == "vehicles");
     require_same_file(manifest, 0.3, &[], &compositions);
 }
 
@@ -111,8 +113,7 @@ fn contacts_walls_figures_and_swaps_give_the_same_file() {
         "manifests/computing-time.toml",
     ];
     // Partitions of the others are flown in other tests.
-    let is_quick =
-        |name: &str| ["standby", "hover-rapier", "computing-time"].iter().any(|it| name.contains(it));
+    let is_quick = |name: &str| ["standby", "hover-rapier"].iter().any(|it| name.contains(it));
     for manifest in cases("manifests", manifests, |name| is_quick(name)) {
         // swap-laws swaps up to 9 s.
         let duration_s = if manifest.contains("swap") { 12.0 } else { 2.5 };

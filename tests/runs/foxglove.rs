@@ -120,7 +120,7 @@ fn a_run_that_is_watched_writes_the_same_bytes_though_a_client_does_not_read() {
     // it. A run on one thread takes no requests and keeps its pace.
     let hosts =
         [(&[][..], "0.1", "4"), (&["--in-process"], "0.25", "2.5"), (&["--compose", "all"], "0.1", "4")];
-    for (host, pace, seconds) in first(2, "hosts", hosts) {
+    for (host, pace, seconds) in first(1, "hosts", hosts) {
         let place = Place::new();
         let (recording, alone) = (place.path("watched.mcap"), place.path("alone.mcap"));
         let duration = format!("run.duration_s={seconds}");

@@ -1,6 +1,6 @@
 //! Identification as a user runs it: flights of a truth that nobody declared, flown on the bus, and what is refused.
 
-use crate::skipped::{first, quick_or};
+use crate::skipped::{first, is_left, quick_or};
 use crate::support::{Place, repository};
 use serde_json::Value;
 use std::f64::consts::PI;
@@ -64,10 +64,11 @@ fn the_bus_agrees_with_the_report_up_to_the_last_sample() {
 /// The thesis measured a delay of about 150 ms that it could not explain, and guessed at its rig.
 #[test]
 fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
+    if is_left("`the_riddle_of_the_late_rig_is_solved` has its truth without a bus") {
+        return;
+    }
     let place = Place::new();
-    // Of 40 s in thorough tests: what 22 s say is the same.
-    let flights =
-        make_short_flights(&place, &["--kind", "rig-a-riddle"], quick_or("22", "40", "longer flights"));
+    let flights = make_short_flights(&place, &["--kind", "rig-a-riddle"], "40");
     let out = place.path("out");
     let report = place.call(&["identify", &flights, "--out", &out, "--json"]).with_code(0).json();
     let mut verdict: Vec<&str> =
@@ -89,20 +90,21 @@ fn the_riddle_of_the_thesis_delay_and_rig_are_told_apart_and_measured() {
 }
 
 /// A hover without inertial sensors cannot tell a mass error from a thrust scale. The proposed flight, flown with the truth, leaves
-/// the right name; quick tests propose it and do not fly it.
+/// the right name.
 #[test]
 fn the_next_flight_leaves_one_name() {
+    if is_left("it flies and identifies for minutes; questions and proposals have tests of their own") {
+        return;
+    }
     let place = Place::new();
     let mut command = Command::new("python3");
     command.args([&repository("scripts/next_flight_cases"), &place.path("cases"), "--case", "mass-hover"]);
     command.env("HUMMINGBUS", env!("CARGO_BIN_EXE_hummingbus"));
-    let is_flown = quick_or(false, true, "proposed flights");
-    command.args((!is_flown).then_some("--only-proposal"));
     let output = place.mark(&mut command).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     assert!(said.contains("mass-error or thrust-scale"), "{said}");
-    assert_eq!(said.contains("1 of 1 cases"), is_flown, "{said}");
+    assert!(said.contains("1 of 1 cases"), "{said}");
     let manifest = place.path("cases/mass-hover/first/next-flight.toml");
     place.call(&["check", &manifest]).with_code(0);
     let text = std::fs::read_to_string(&manifest).unwrap();
@@ -222,6 +224,9 @@ fn a_stand_with_noise_gives_the_constants_within_its_intervals() {
 /// The thesis's rotor on a stand and in flight: both give the same figures, and the report says so.
 #[test]
 fn stand_and_flights_of_one_vehicle_agree() {
+    if is_left("`a_stand_with_noise_gives_the_constants_within_its_intervals` has the stand") {
+        return;
+    }
     let place = Place::new();
     let flights = make_flights(&place, &["--fit", "3"]);
     let (recording, out) = (place.path("stand.mcap"), place.path("rotor"));

@@ -1,7 +1,7 @@
 //! Input files are read once: a file that is edited after that changes nothing of the run or the fit.
 
 use crate::recordings::{open, require_same};
-use crate::skipped::cases;
+use crate::skipped::{cases, is_left};
 use crate::support::{Launch, Place, poll, repository};
 use hummingbus::{COMPONENTS, Graph, Host, Launcher, Manifest};
 use rustix::process::{Signal, kill_process};
@@ -112,8 +112,8 @@ fn a_graph_is_flown_with_the_files_that_were_checked() {
 fn an_edit_at_any_moment_gives_the_recording_of_one_file() {
     let [old, new] = references(0.3, "");
     assert!(old != new, "the edit changes the flight");
-    // Before the first process, while they start, and behind the last.
-    for count in cases("moments", 0..=9, |count| [0, 3, 6, 9].contains(count)) {
+    // Before the first process, while they start, and behind the last; quick tests leave out the first.
+    for count in cases("moments", 0..=9, |count| [3, 9].contains(count)) {
         let place = Place::new();
         let (manifest, recording) = (manifest(&place, 0.3, ""), place.path("edited.mcap"));
         let mut launch = start(&place, &manifest, &recording);
@@ -150,6 +150,9 @@ fn a_restart_flies_the_files_of_the_run() {
 
 #[test]
 fn a_backup_that_joins_late_flies_the_files_of_the_run() {
+    if is_left("`a_live_swap_flies_the_files_of_the_run_and_reads_a_new_one_once` has a backup") {
+        return;
+    }
     let place = Place::new();
     let tables = "[[swap]]\nprocess = \"controller\"\nat_tick = 500\nshadow_ticks = 20\n";
     let recording = replaced_after_an_edit(&place, tables, |launch| launch.release());
@@ -234,6 +237,9 @@ fn a_model_of_a_command_has_to_be_there_and_its_data_may_be_a_device() {
 /// The flights of a validation are flown one after the other: the edit comes while the first one flies.
 #[test]
 fn all_flights_of_a_validation_are_flown_with_one_file() {
+    if is_left("`an_edit_at_any_moment_gives_the_recording_of_one_file` edits one flight") {
+        return;
+    }
     use crate::validate::{ALL, flown};
     let place = Place::new();
     let flights = flown(&place, "hover-gentle", &[], ALL);

@@ -1,7 +1,7 @@
 //! Runs that are watched and steered while they fly: what is seen is true, and nothing of it changes a recording.
 
 use crate::recordings::require_same;
-use crate::skipped::first;
+use crate::skipped::{first, is_left};
 use crate::support::{Ended, Launch, Place, poll, repository};
 use crate::terminal::Terminal;
 use rustix::process::Signal;
@@ -61,6 +61,11 @@ fn state(place: &Place) -> (String, u64) {
 
 #[test]
 fn pausing_stepping_and_pacing_change_no_byte_of_a_recording() {
+    if is_left(
+        "`view::a_run_that_is_watched_and_steered_writes_the_same_bytes_and_ends_with_its_page` steers a run",
+    ) {
+        return;
+    }
     let place = Place::new();
     let flight = take_off(&place, "steered.mcap", SLOW, SHORT);
     let held = tick_after(&place, &["pause"]);

@@ -1,7 +1,7 @@
 //! Every sample is recorded: complete, in order, at its topic's rate.
 
 use crate::recordings::topics;
-use crate::skipped::quick_or;
+use crate::skipped::{cases, quick_or};
 use crate::support::{Load, Place, repository};
 
 const TICK_NS: u64 = 1_000_000;
@@ -38,7 +38,7 @@ fn require_complete(ticks: u32, more: &[&str]) {
 
 #[test]
 fn a_long_run_is_recorded_whole() {
-    require_complete(quick_or(20_000, 60_000, "flights of a minute"), &[]);
+    require_complete(quick_or(10_000, 60_000, "flights of a minute"), &[]);
 }
 
 #[test]
@@ -50,7 +50,8 @@ fn nothing_is_lost_on_a_loaded_machine() {
 
 #[test]
 fn the_last_ticks_are_recorded_whatever_the_length_of_the_run() {
-    for ticks in [1, 2, 9, 10, 11, 63, 64, 65, 129] {
+    let lengths = [1, 2, 9, 10, 11, 63, 64, 65, 129];
+    for ticks in cases("lengths", lengths, |ticks| [1, 10, 64, 129].contains(ticks)) {
         require_complete(ticks, &[]);
     }
 }

@@ -4,6 +4,7 @@ use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, require_same};
 use crate::refusals::{good, refused, refused_text};
 use crate::scenarios::{kind, nodes};
+use crate::skipped::is_left;
 use crate::support::{Place, repository};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -56,6 +57,27 @@ const REPRESENTATIVE: [&str; 24] = [
 /// True for the manifests that quick tests of all shipped ones take.
 pub fn is_representative(path: &str) -> bool {
     REPRESENTATIVE.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
+}
+
+/// Some of those: effects in detail, joints, a rig, a radio link, a node of another program, steps that take time, and a node that is replaced.
+const BRIEF: [&str; 12] = [
+    "commands-over-a-link",
+    "computing-time",
+    "custom-controller",
+    "driven-joints",
+    "hexa-hover",
+    "identify/excite",
+    "imu-detail",
+    "replay-nanobench",
+    "rig-hover",
+    "sensors",
+    "standby",
+    "wall-stop-open-gps",
+];
+
+/// True for the manifests that quick tests take where each is flown several times.
+pub fn is_brief(path: &str) -> bool {
+    BRIEF.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
 }
 
 /// Manifests in the folders below that fly by themselves: no sets, campaigns and autopilots, which are parts of
@@ -113,6 +135,11 @@ fn read_by<'g>(graph: &'g Value, name: &str, port: &str) -> &'g str {
 /// The representative ones have every kind of node that any has.
 #[test]
 fn every_shipped_manifest_is_accepted() {
+    if is_left(
+        "`the_truth_as_an_estimate_is_flown_by_what_the_thesis_prints_and_by_nothing_else` checks them, too",
+    ) {
+        return;
+    }
     let place = Place::new();
     let shipped = shipped();
     assert!(shipped.len() >= 7, "{shipped:?}");
@@ -130,6 +157,7 @@ fn every_shipped_manifest_is_accepted() {
     }
     assert_eq!(representative, all);
     assert_eq!(count, REPRESENTATIVE.len(), "one of {REPRESENTATIVE:?} is not shipped");
+    assert!(BRIEF.iter().all(|name| REPRESENTATIVE.contains(name)), "{BRIEF:?}");
 }
 
 // Includes

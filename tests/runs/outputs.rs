@@ -3,6 +3,7 @@
 use crate::laps;
 use crate::nodes::{manifest, sender, table};
 use crate::recordings::{open, rows};
+use crate::skipped::{cases, first, quick_or};
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, partial, poll, repository};
 use recorder::reader::Recording;
 use rustix::process::{Signal, kill_process};
@@ -53,19 +54,10 @@ fn a_second_run_to_the_recording_of_a_live_one_is_refused_by_any_spelling() {
     place.call(&["run", &short(&place), "--record", &recording]).with_code(0);
     symlink(place.path(folder), place.path("folder")).unwrap();
     symlink("recorded/flown.mcap", place.path("link.mcap")).unwrap();
+    let duration = format!("run.duration_s={}", quick_or(3, 9, "longer flights"));
     let fly = |recording: &str, seed: &str| {
         let seed = format!("run.seed={seed}");
-        place.start(&[
-            "run",
-            &hover,
-            "--record",
-            recording,
-            "--set",
-            &seed,
-            "--json",
-            "--set",
-            "run.duration_s=9",
-        ])
+        place.start(&["run", &hover, "--record", recording, "--set", &seed, "--json", "--set", &duration])
     };
     let mut first = fly(&recording, "1");
     first.hold_at(300);
@@ -107,7 +99,7 @@ fn runs_to_two_names_of_one_recording_leave_each_its_own() {
 fn of_many_runs_that_start_at_once_exactly_one_flies() {
     let (place, hover) = (Place::new(), repository("manifests/hover.toml"));
     place.call(&["run", &short(&place), "--record", &place.path("flown.mcap")]).with_code(0);
-    for round in 0..4 {
+    for round in first(2, "rounds", 0..4) {
         if round % 2 == 1 {
             fs::copy(place.path("flown.mcap"), place.path("flown.partial.mcap")).unwrap();
         }
@@ -327,15 +319,20 @@ fn nothing_is_replaced_but_a_file_of_the_same_kind() {
         .with_code(0);
     let file = |name: &str| place.path(name);
     let log = format!("process.source.log={}", file("a.log"));
-    for (args, name) in [
-        (vec!["run", &path, "--record", &file("a.mcap")], "a.mcap"),
-        (vec!["run", &path, "--set", &log], "a.log"),
-        (vec!["profile", &path, "--html", &file("a.html")], "a.html"),
-        (vec!["profile", &path, "--trace", &file("a.json")], "a.json"),
-        (vec!["plot", &recording, "--svg", &file("a.svg")], "a.svg"),
-        (vec!["plot", &recording, "--png", &file("a.png")], "a.png"),
-        (vec!["plot", &recording, "--out", &file("b.html")], "b.html"),
-    ] {
+    let quick = ["a.mcap", "a.html", "a.svg"];
+    for (args, name) in cases(
+        "kinds of files",
+        [
+            (vec!["run", &path, "--record", &file("a.mcap")], "a.mcap"),
+            (vec!["run", &path, "--set", &log], "a.log"),
+            (vec!["profile", &path, "--html", &file("a.html")], "a.html"),
+            (vec!["profile", &path, "--trace", &file("a.json")], "a.json"),
+            (vec!["plot", &recording, "--svg", &file("a.svg")], "a.svg"),
+            (vec!["plot", &recording, "--png", &file("a.png")], "a.png"),
+            (vec!["plot", &recording, "--out", &file("b.html")], "b.html"),
+        ],
+        |(_, name)| quick.contains(name),
+    ) {
         require_own_kind(&place, &args, &file(name));
     }
     // A broken run's name is somebody's own.

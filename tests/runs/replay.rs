@@ -1,6 +1,7 @@
 //! The measured flight: what is replayed, where the plants start, and the errors of the summary.
 
 use crate::recordings::{require_same, rows};
+use crate::skipped::is_left;
 use crate::support::{Ended, Place, repository};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -169,6 +170,9 @@ fn cat(place: &Place, recording: &str, topic: &str) -> BTreeMap<u64, Value> {
 
 #[test]
 fn the_summary_s_errors_are_those_of_the_recording() {
+    if is_left("`judging::comparisons_are_the_same_without_a_recording` has comparisons") {
+        return;
+    }
     let Some(data) = data() else { return };
     let place = Place::new();
     let (summary, recording) = replay(&place, &data);

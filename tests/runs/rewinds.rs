@@ -1,6 +1,7 @@
 //! Paused runs that go back to one of their checkpoints: what is flown then is what a run from that checkpoint flies.
 
 use crate::recordings::first_tick;
+use crate::skipped::first;
 use crate::support::{Place, repository};
 use std::fs;
 
@@ -14,7 +15,7 @@ fn ctl(place: &Place, run: &str, args: &[&str]) -> serde_json::Value {
 fn a_run_that_went_back_flies_as_one_from_the_checkpoint_and_its_recording_says_so() {
     let place = Place::new();
     let hover = repository("manifests/hover.toml");
-    for compose in ["none", "all"] {
+    for compose in first(1, "compositions", ["none", "all"]) {
         let record = place.path("a.mcap");
         let args = ["run", &hover, "--record", &record, "--checkpoint-every", "100ms", "--compose", compose];
         let mut launch = place.start_endless(&args);

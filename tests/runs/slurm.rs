@@ -3,7 +3,7 @@
 
 use crate::campaign::{HOVERS, rows, written};
 use crate::campaign_results::other_build;
-use crate::skipped::{is_thorough, leave, skip};
+use crate::skipped::{is_left, skip};
 use crate::support::{Ended, HUMMINGBUS, Launch, Place, repository};
 use rustix::process::Signal;
 use std::fs;
@@ -78,6 +78,10 @@ fn stand_in(place: &Place, lost: &str) {
 
 #[test]
 fn a_cluster_gives_the_rows_of_this_machine_whatever_it_loses() {
+    if is_left("`the_chunks_of_a_lost_node_are_submitted_again_and_no_others` has scripts in place of Slurm")
+    {
+        return;
+    }
     let program = |name: &str| {
         let folders = ["/usr/bin", "/usr/sbin", "/bin", "/sbin"];
         folders.iter().any(|folder| fs::exists(format!("{folder}/{name}")).unwrap_or(false))
@@ -89,8 +93,7 @@ fn a_cluster_gives_the_rows_of_this_machine_whatever_it_loses() {
     if !rustix::process::geteuid().is_root() {
         return skip("a Slurm cluster of its own needs root");
     }
-    let flights = if is_thorough() { 240 } else { 60 };
-    leave(240 - flights, "flights of each of 5 campaigns");
+    let flights = 240;
     let mut command = Command::new(repository("scripts/slurm-check"));
     let output = command.args([HUMMINGBUS, &flights.to_string()]).output().unwrap();
     let (text, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
@@ -130,6 +133,9 @@ fn the_chunks_of_a_lost_node_are_submitted_again_and_no_others() {
 
 #[test]
 fn a_controller_that_is_busy_when_chunks_are_submitted_again_costs_nothing() {
+    if is_left("`the_chunks_of_a_lost_node_are_submitted_again_and_no_others` loses chunks") {
+        return;
+    }
     let place = Place::new();
     stand_in(&place, "0\nbusy\nbusy\n");
     let ended = on_slurm(&place, &place.path("out"), &[]).with_code(0);
@@ -157,6 +163,9 @@ fn a_campaign_that_is_stopped_cancels_all_its_arrays_and_is_flown_by_the_next_ca
 
 #[test]
 fn flights_of_a_chunk_that_is_always_lost_have_the_reason_and_are_flown_by_the_next_call() {
+    if is_left("`the_chunks_of_a_lost_node_are_submitted_again_and_no_others` loses chunks") {
+        return;
+    }
     let place = Place::new();
     stand_in(&place, "1\n1\n1\n");
     let out = place.path("out");

@@ -1,7 +1,7 @@
 //! Hosts that lack something: a run says what, and leaves nothing behind.
 
 use crate::refusals::good;
-use crate::skipped::skip;
+use crate::skipped::{quick_or, skip};
 use crate::support::{Ended, HUMMINGBUS, Place, poll, repository};
 use rustix::process::Signal;
 use std::ffi::OsStr;
@@ -173,11 +173,12 @@ fn a_folder_that_is_not_utf_8_is_named() {
 #[test]
 fn a_chain_of_includes_has_a_limit() {
     let place = Place::new();
-    for number in 0..20_000 {
+    let count = quick_or(200, 20_000, "longer chains");
+    for number in 0..count {
         place.write(&format!("{number}.toml"), format!("include = [\"{}.toml\"]\n", number + 1));
     }
-    place.write("20000.toml", good());
+    place.write(&format!("{count}.toml"), good());
     let ended = place.call(&["check", &place.path("0.toml")]).with_code(2);
     ended.says(&["63.toml:1:12: includes stand more than 64 files deep, with ", "64.toml", "side by side"]);
-    place.call(&["check", &place.path("19940.toml")]).with_code(0);
+    place.call(&["check", &place.path(&format!("{}.toml", count - 60))]).with_code(0);
 }

@@ -1,7 +1,7 @@
 //! Contracts of backups: a swap, a shadow, a standby and a restart change what the manifest says and nothing
 //! else.
 
-use crate::skipped::{is_thorough, leave};
+use crate::skipped::{first, is_left};
 use crate::support::{Ended, Place, repository};
 use recorder::reader::Recording;
 use std::fs;
@@ -191,7 +191,7 @@ fn a_swap_to_an_identical_plant_changes_no_message() {
 #[test]
 fn a_plant_hands_its_state_to_one_with_other_numbers() {
     let place = Place::new();
-    for base in BACKENDS {
+    for base in first(1, "backends", BACKENDS) {
         let (ended, recording) = swap_plant(&place, base, "with.parameters.substeps = 4");
         let ended = ended.flown();
         assert_eq!(ended.json()["successions"][0]["hand_over"], "state", "{ended}");
@@ -335,9 +335,11 @@ fn settled(place: &Place) -> (usize, usize) {
 fn hundreds_of_swaps_in_one_run_leak_nothing() {
     let place = Place::new();
     let asked = std::env::var("SWAPS").map(|text| text.parse::<u32>().expect("SWAPS is a number"));
-    let count = asked.unwrap_or_else(|_| if is_thorough() { 200 } else { 130 });
+    if asked.is_err() && is_left("other tests have a few swaps, which show no leak") {
+        return;
+    }
+    let count = asked.unwrap_or(200);
     assert!(count >= 111, "too few swaps to show a leak: SWAPS={count}");
-    leave(200_usize.saturating_sub(count as usize), "swaps");
     let ticks = 1000 + 20 * count;
     let swaps = format!(
         "[[swap]]\nprocess = \"controller\"\nat_tick = 400\nshadow_ticks = 5\nrepeat = {count}\nevery_ticks = 20\n"

@@ -3,7 +3,7 @@
 
 use super::{a_lost_radio_reaches_the_firmware, call, compiled, each_flies_its_own};
 use crate::recordings::{require_same, topics};
-use crate::skipped::variable_or_skip;
+use crate::skipped::{cases, first, is_left, variable_or_skip};
 use crate::support::{Place, poll, repository};
 use std::fs;
 use std::sync::OnceLock;
@@ -64,7 +64,7 @@ fn packets_that_come_twice_or_late_or_from_others_change_nothing() {
         topics(&recording)
     };
     let undisturbed = flight("", "undisturbed.mcap");
-    for more in ["RESENDS 1\n", "LATE 1\n", "FOREIGN 1\n"] {
+    for more in first(1, "disturbances", ["RESENDS 1\n", "LATE 1\n", "FOREIGN 1\n"]) {
         let disturbed = flight(more, "disturbed.mcap");
         assert!(disturbed == undisturbed, "{more}");
     }
@@ -72,12 +72,18 @@ fn packets_that_come_twice_or_late_or_from_others_change_nothing() {
 
 #[test]
 fn a_lost_radio_is_lost_for_ardupilot() {
+    if is_left("`a_lost_radio_is_lost_for_the_firmware` loses it") {
+        return;
+    }
     let place = Place::new();
     a_lost_radio_reaches_the_firmware(&manifest(), &stand_in(&place, ""));
 }
 
 #[test]
 fn each_ardupilot_of_a_run_flies_its_own_vehicle() {
+    if is_left("`px4::each_px4_of_a_run_flies_its_own_vehicle` has several") {
+        return;
+    }
     let place = Place::new();
     let settings = stand_in(&place, "");
     each_flies_its_own(&place, &manifest(), &settings);
@@ -85,7 +91,7 @@ fn each_ardupilot_of_a_run_flies_its_own_vehicle() {
 
 #[test]
 fn an_ardupilot_that_fails_ends_the_run_with_its_last_words() {
-    let cases: [(&str, &[&str]); 9] = [
+    let all: [(&str, &[&str]); 9] = [
         ("MUTE 1\n", &["ardupilot runs and gave no answer for 0.5 s", "Stands in for ArduCopter"]),
         // While it rests, and in flight: 6 s of its time are before tick 0.
         ("ENDS 1\n", &["ardupilot ended with exit code 3", "out of coffee"]),
@@ -97,7 +103,9 @@ fn an_ardupilot_that_fails_ends_the_run_with_its_last_words() {
         ("GOES_BACK 8\n", &["its frame count went back from ", " to 1, expected "]),
         ("UNARMED 1\n", &["it is not armed at tick 0", "armed_by_channel"]),
     ];
-    for (more, told) in cases {
+    // While it rests, and in flight.
+    let quick = ["MUTE 1\n", "ENDS 8\n", "UNARMED 1\n"];
+    for (more, told) in cases("failures", all, |(more, _)| quick.contains(more)) {
         let place = Place::new();
         let mut settings = stand_in(&place, more);
         settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());

@@ -2,7 +2,7 @@
 
 use super::{a_lost_radio_reaches_the_firmware, call, compiled, each_flies_its_own};
 use crate::recordings::{require_same, topics};
-use crate::skipped::variable_or_skip;
+use crate::skipped::{cases, is_left, variable_or_skip};
 use crate::support::{Place, poll, repository};
 use std::fs;
 use std::path::Path;
@@ -95,6 +95,9 @@ fn the_last_outputs_of_a_step_count() {
 /// By the time of the host, 30 ms after each hundredth message of the sensors.
 #[test]
 fn answers_that_come_late_change_nothing() {
+    if is_left("`the_last_outputs_of_a_step_count` disturbs the answers, too") {
+        return;
+    }
     let place = Place::new();
     let undisturbed = topics(&flight(&place, "", "undisturbed.mcap"));
     assert!(topics(&flight(&place, "LATE 1\n", "late.mcap")) == undisturbed);
@@ -102,6 +105,9 @@ fn answers_that_come_late_change_nothing() {
 
 #[test]
 fn a_lost_radio_is_lost_for_px4() {
+    if is_left("`a_lost_radio_is_lost_for_the_firmware` loses it") {
+        return;
+    }
     let place = Place::new();
     a_lost_radio_reaches_the_firmware(&manifest(), &stand_in(&place, "LOST 1\n"));
 }
@@ -115,7 +121,7 @@ fn each_px4_of_a_run_flies_its_own_vehicle() {
 
 #[test]
 fn a_px4_that_fails_ends_the_run_with_its_last_words() {
-    let cases: [(&str, &[&str]); 12] = [
+    let all: [(&str, &[&str]); 12] = [
         ("NEVER_CONNECTS 1", &["px4 runs and gave no answer for 2 s"]),
         ("NEVER_BOOTS 1", &["its start-up script has not ended within 120 s of its time"]),
         ("UNKNOWN 1", &["a parameter that PX4 refuses: ", "Parameter UNKNOWN not found"]),
@@ -130,7 +136,9 @@ fn a_px4_that_fails_ends_the_run_with_its_last_words() {
         ("NO_LOCKSTEP 1", &["it was built without lockstep"]),
         ("UNARMED 1", &["it is not armed at tick 0", "armed_by_channel"]),
     ];
-    for (more, told) in cases {
+    // Before it answers, while it starts, and in flight.
+    let quick = ["NEVER_CONNECTS 1", "UNKNOWN 1", "CRASHES 7.5", "WRONG_CRC 7.5"];
+    for (more, told) in cases("failures", all, |(more, _)| quick.contains(more)) {
         let place = Place::new();
         let mut settings = stand_in(&place, more);
         // Short limits only where they are to pass: a loaded host answers late.
