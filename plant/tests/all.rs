@@ -1,6 +1,8 @@
 //! Tests of the plant, in one program, which builds sooner than one for each file.
 
 mod common;
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 
 mod any_contact;
 mod closed_forms;

@@ -2,6 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
+use crate::skipped::drawn;
 use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::contact_dynamics::hull::Hull;
@@ -56,7 +57,7 @@ fn start() -> impl Strategy<Value = RigidBody> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 30, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: drawn(6, 30), failure_persistence: None, ..ProptestConfig::default() })]
 
     /// In a room of 10 m: floor, walls, corners.
     #[test]

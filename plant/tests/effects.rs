@@ -2,6 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
+use crate::skipped::drawn;
 use common::{TICK_S, crazyflie, hummingbird};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::effects::FlightCondition;
@@ -341,7 +342,7 @@ fn power_W(wrench: &Wrench, situation: &FlightCondition) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: drawn(120, 300), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn whatever_its_parameters_an_effect_is_finite(

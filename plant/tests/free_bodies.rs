@@ -2,6 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
+use crate::skipped::{is_left, quick_or};
 use common::parts::{body, given, joint};
 use common::{TICK_S, hummingbird};
 use nalgebra::{Matrix3, Vector3};
@@ -49,6 +50,9 @@ fn what_nothing_holds_flies_on_a_parabola_and_keeps_its_spin() {
 
 #[test]
 fn a_pendulum_on_a_ball_joint_swings_as_the_elliptic_integral_says() {
+    if is_left("`rigs::it_swings_about_the_bearing_as_a_pendulum_does` has a pendulum") {
+        return;
+    }
     // A ball of radius 0.05 m, 1 m below the joint, from 60 degrees.
     let (sin, cos) = libm::sincos(PI / 3.0);
     let centre = format!("[{sin}, 0, {}]", 5.0 - cos);
@@ -142,7 +146,7 @@ fn a_rope_that_swings_keeps_its_energy_and_its_length() {
     let ball = [("centre", "[1, 0, 5]", "m"), BALL[1], BALL[2]];
     let rope = [("anchor", "[0, 0, 5]", "m"), ("end", "[1, 0, 5]", "m"), ("length", "1", "m")];
     let mut plant = plant(&[body("balls", "ball", &ball), joint("rope", ["world", "ball"], &rope)]);
-    for _ in 0..10_000 {
+    for _ in 0..quick_or(3_000, 10_000, "longer times") {
         let found = tick(&mut plant);
         let energy_J_kg = found.velocity_W_m_s.norm_squared() / 2.0 + G_M_S2 * (found.position_W_m.z - 5.0);
         assert!(energy_J_kg.abs() < 1e-6, "{energy_J_kg} J/kg at {found:?}");
@@ -397,6 +401,7 @@ fn another_instance_goes_on_from_a_snapshot_to_the_same_bits() {
 /// A room of 4 m with bodies of every shape, thrown about: nothing makes energy, and nothing gets out.
 mod thrown {
     use super::*;
+    use crate::skipped::drawn;
     use proptest::prelude::*;
 
     fn numbers(most: f64) -> impl Strategy<Value = String> {
@@ -414,7 +419,7 @@ mod thrown {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { cases: drawn(5, 12), failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
         fn makes_no_energy_and_stays_in_the_room(

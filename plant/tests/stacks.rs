@@ -2,6 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
+use crate::skipped::{cases, first, quick_or};
 use bus::random::{stream, uniform};
 use common::{TICK_S, hummingbird};
 use nalgebra::Vector3;
@@ -130,9 +131,12 @@ fn most_gain_J(ratio: f64, friction: f64, offsets: u32) -> f64 {
 /// `STACKS` is the number of places beside the middle: the table of docs/world.md has three.
 #[test]
 fn a_heavy_box_that_falls_on_a_light_one_makes_no_energy_and_does_not_squeeze_it_out() {
-    let offsets = std::env::var("STACKS").map_or(1, |text| text.parse().expect("STACKS is a number"));
+    let asked = std::env::var("STACKS").map(|text| text.parse::<u32>().expect("STACKS is a number"));
+    let is_quick = |ratio: &f64| asked.is_ok() || [100.0, 10_000.0].contains(ratio);
+    let ratios = cases("mass ratios", [1.0, 10.0, 50.0, 100.0, 1_000.0, 10_000.0], is_quick);
+    let offsets = asked.unwrap_or(1);
     println!("| mass ratio | no friction | friction 0.5 | friction 1 |\n|---|---|---|---|");
-    for ratio in [1.0, 10.0, 50.0, 100.0, 1_000.0, 10_000.0] {
+    for ratio in ratios {
         let [none, half, one] = [0.0, 0.5, 1.0].map(|friction| most_gain_J(ratio, friction, offsets));
         println!("| 1:{ratio} | {none:.1e} J | {half:.1e} J | {one:.1e} J |");
     }
@@ -170,7 +174,7 @@ fn a_tower_of_ten_with_the_heavy_ones_on_top_stands() {
         })
         .collect();
     let mut stack = Stack::new(&cubes, 0.5, 2);
-    let (fastest_m_s, farthest_m) = stack.fastest_m_s(1_000, 9);
+    let (fastest_m_s, farthest_m) = stack.fastest_m_s(quick_or(400, 1_000, "longer times"), 9);
     assert!(fastest_m_s < 1e-4 && farthest_m < 1e-6, "{fastest_m_s} m/s, {farthest_m} m");
     assert_eq!(stack.plant.trouble(), None);
 }
@@ -181,6 +185,7 @@ fn a_tower_of_ten_with_the_heavy_ones_on_top_stands() {
 fn drawn_stacks_of_boxes_of_many_sizes_are_solved_and_make_no_energy() {
     let mut random = stream(1, "drawn bodies");
     let mut draw = |least: f64, most: f64| least + (most - least) * uniform(&mut random);
+    let taken = cases("stacks", [20, 30, 3, 7], |number| [20, 3].contains(number));
     for number in 0..=30 {
         let (friction, mut top_m, mut heaviest_kg) = (draw(0.2, 0.9), 0.0, 0.0_f64);
         let count = draw(2.0, 6.999) as u32;
@@ -196,7 +201,7 @@ fn drawn_stacks_of_boxes_of_many_sizes_are_solved_and_make_no_energy() {
                 cuboid(&format!("box {number}"), mass_kg, centre_m, size_m)
             })
             .collect();
-        if ![20, 30, 3, 7].contains(&number) {
+        if !taken.contains(&number) {
             continue;
         }
         let mut stack = Stack::new(&boxes, friction, 2);
@@ -212,11 +217,15 @@ fn drawn_stacks_of_boxes_of_many_sizes_are_solved_and_make_no_energy() {
 /// and prints how many are flown to the end: the figure of docs/world.md.
 #[test]
 fn stacks_that_bounce_are_solved_and_make_no_energy() {
-    let all = std::env::var("DRAWN").map(|text| text.parse().expect("DRAWN is a number"));
+    let all = std::env::var("DRAWN").map(|text| text.parse::<u32>().expect("DRAWN is a number"));
     let mut random = stream(1, "bouncing stacks");
     let mut draw = |least: f64, most: f64| least + (most - least) * uniform(&mut random);
     let mut ended = Vec::new();
-    for number in 0..all.clone().unwrap_or(8_u32) {
+    let numbers: Vec<u32> = match &all {
+        Ok(count) => (0..*count).collect(),
+        Err(_) => first(3, "stacks", 0..8),
+    };
+    for number in numbers {
         let (surface, count) = ([draw(0.2, 0.9), draw(0.0, 0.4)], draw(3.0, 7.999) as u32);
         let (mut top_m, mut all_kg) = (0.0, 0.0);
         let boxes: Vec<String> = (0..count)
@@ -337,10 +346,11 @@ fn impulses_that_are_not_found_are_told_with_the_names_of_both() {
 
 mod drawn {
     use super::*;
+    use crate::skipped::drawn;
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 10, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { cases: drawn(4, 10), failure_persistence: None, ..ProptestConfig::default() })]
 
         /// Towers of two to ten cubes with gaps between them, none upright, thrown at each other's sides.
         #[test]

@@ -86,6 +86,16 @@ pub fn is_left(why: &str) -> bool {
     true
 }
 
+/// The number of random cases that the running test draws: `quick`, or `all` if it is thorough. Reports the others.
+#[allow(dead_code, reason = "few crates draw cases")]
+pub fn drawn(quick: u32, all: u32) -> u32 {
+    if is_thorough() {
+        return all;
+    }
+    leave((all - quick) as usize, "drawn cases");
+    quick
+}
+
 /// True where `HUMMINGBUS_STEADY` says that nothing else runs on this machine; a skipped test elsewhere. For tests of what
 /// host time decides, such as the silence of a person who flies by hand.
 #[allow(dead_code, reason = "few crates' tests need it")]
