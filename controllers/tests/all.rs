@@ -5,6 +5,8 @@ mod flight;
 #[allow(dead_code, reason = "the generator's own main is not used here")]
 #[path = "../examples/random_pilot.rs"]
 mod random_pilot;
+#[path = "../../tests/runs/skipped.rs"]
+mod skipped;
 
 mod bumpless_transfer;
 mod cascade;

@@ -1,5 +1,6 @@
 //! ULogs that are damaged, cut or subscribed again: the flights that are read from them, and the notes.
 
+use crate::skipped::cases;
 use crate::support;
 use flights::Flight;
 use support::{Place, ulog, ulog_message};
@@ -63,8 +64,9 @@ fn one_wrong_byte_anywhere_costs_what_is_at_it_alone() {
     let log = with_syncs();
     let starts = messages(&log);
     // Every byte of the heads and of the content of the messages in the middle of the log.
+    let values = cases("values", [0, 1, 0x44, 0x4F, 0x7F, 0xFF], |value| [0, 0xFF].contains(value));
     for at in starts[300]..starts[306] {
-        for value in [0, 1, 0x44, 0x4F, 0x7F, 0xFF] {
+        for value in values.iter().copied() {
             let mut broken = log.clone();
             broken[at] = value;
             let flight = read(&broken);
