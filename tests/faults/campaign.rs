@@ -1,6 +1,6 @@
 //! Many seeded cases, two at a time; one that fails says how to repeat it.
 //!
-//! Quick tests take the first third of the cases, and six of few. `HUMMINGBUS_KILL_POINTS` says how many, `HUMMINGBUS_SEED` which, `HUMMINGBUS_KILL_POINT` picks one of them to repeat
+//! Quick tests take the first sixth of the cases, and at least six. `HUMMINGBUS_KILL_POINTS` says how many, `HUMMINGBUS_SEED` which, `HUMMINGBUS_KILL_POINT` picks one of them to repeat
 //! it, and `HUMMINGBUS_LOAD` keeps cores busy beside them with this many threads.
 
 use crate::skipped::{is_thorough, leave};
@@ -44,7 +44,7 @@ fn share(name: &str, count: u64) -> u64 {
     if is_thorough() {
         return count;
     }
-    let share = count.div_ceil(3).max(6).min(count);
+    let share = count.div_ceil(6).max(6).min(count);
     leave((count - share) as usize, &format!("cases of {name}"));
     share
 }

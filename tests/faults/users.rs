@@ -140,7 +140,7 @@ fn another_user_who_tries_at_every_moment_opens_no_file_of_a_run() {
     let manifest = repository("manifests/hover.toml");
     let (prefix, is_over, folder) =
         (Mutex::new("/nowhere".to_owned()), AtomicBool::new(false), place.path("tmp"));
-    let runs = first(10, "raced runs", 0..RACED_RUNS).len();
+    let runs = first(5, "raced runs", 0..RACED_RUNS).len();
     let race = std::thread::scope(|scope| {
         let racer = scope.spawn(|| race(&prefix, Path::new(&folder), &is_over));
         let finish = Finish(&is_over);

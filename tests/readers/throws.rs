@@ -1,16 +1,17 @@
 //! MuJoCo, closed forms and the laws of mechanics judge drawn stacks and throws that the program flew.
 
+use crate::skipped::quick_or;
 use crate::{HUMMINGBUS, ROOT, readers};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// `THROWS=1-12` draws from these seeds instead of the first two.
+/// `THROWS=1-12` draws from these seeds instead of the first two, of which quick tests take one.
 #[test]
 fn drawn_stacks_and_throws_are_what_mujoco_and_mechanics_say() {
     let Some(readers) = readers() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let seeds = std::env::var("THROWS").unwrap_or_else(|_| "1-2".to_owned());
+    let seeds = std::env::var("THROWS").unwrap_or_else(|_| quick_or("1", "1-2", "seeds").to_owned());
     let output = judge(&readers, folder.path(), &["--fly", HUMMINGBUS, "--seeds", &seeds]);
     let table = String::from_utf8_lossy(&output.stdout);
     println!("{table}");
