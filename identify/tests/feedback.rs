@@ -28,8 +28,8 @@ fn the_interval_of_the_inertia_holds_the_truth_beside_slow_disturbances() {
 
 #[test]
 fn no_inertia_is_named_for_a_disturbance_that_the_controller_answers() {
-    // A slow one of a hover and a fast one of a course.
-    let taken = cases("disturbances", some(), |(seed, _)| [SEED + 26, SEED + 47].contains(seed));
+    // Quick tests take a strong and slow one of a hover.
+    let taken = cases("disturbances", some(), |(seed, _)| *seed == SEED + 26);
     let named: Vec<(Gust, Vec<&str>)> = taken
         .par_iter()
         .map(|(seed, gust)| (*gust, searched(gust, 0.0, *seed).verdict))

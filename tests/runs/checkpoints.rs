@@ -248,7 +248,7 @@ fn whoever_has_taken_over_by_then_goes_on() {
     let whole = place.path("a.mcap");
     let flown = place.call(&["run", &manifest, "--record", &whole, "--json"]).with_code(0).json();
     let later = place.path("b.mcap");
-    for tick in cases("ticks", [2501, 4500, 7500, 10_001], |tick| [4500, 10_001].contains(tick)) {
+    for tick in cases("ticks", [2501, 4500, 7500, 10_001], |tick| *tick == 4500) {
         // Nobody takes over behind the last: one process can host what is left.
         let host = if tick > 9000 { HOSTS[0] } else { HOSTS[1] };
         let file = place.path(&format!("a.{tick}.ckpt"));

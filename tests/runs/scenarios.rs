@@ -2,7 +2,7 @@
 //! truth.
 
 use crate::recordings::rows;
-use crate::skipped::{cases, first, is_thorough, leave};
+use crate::skipped::{cases, first, is_left, is_thorough, leave};
 use crate::support::{Ended, Place, repository};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -331,6 +331,9 @@ fn over_a_serial_radio_good_and_bad() {
 
 #[test]
 fn by_controllers_whose_steps_take_time() {
+    if is_left("`judging::a_run_without_a_recording_has_the_verdict_of_its_recording` flies half of it") {
+        return;
+    }
     fly("computing-time");
 }
 
