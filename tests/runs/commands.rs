@@ -330,7 +330,7 @@ fn a_truncated_recording_is_a_prefix_up_to_its_last_whole_chunk() {
     let place = Place::new();
     let whole = recording(&place);
     let bytes = fs::read(&whole).unwrap();
-    for part in 1..16 {
+    for part in cases("lengths", 1..16, |part| part % 3 == 0) {
         let cut = place.write("cut.mcap", &bytes[..bytes.len() * part / 16]);
         let ended = place.call(&["diff", &whole, &cut]).with_code(1);
         ended.says(&[&cut, "was cut off", "its writer did not finish it"]);
@@ -344,7 +344,7 @@ fn a_recording_with_a_wrong_byte_is_never_identical_and_never_a_crash() {
     let place = Place::new();
     let whole = recording(&place);
     let bytes = fs::read(&whole).unwrap();
-    for part in cases("bytes", 0..64, |part| part % 4 == 0) {
+    for part in cases("bytes", 0..64, |part| part % 8 == 0) {
         let mut changed = bytes.clone();
         changed[bytes.len() * part / 64] ^= 0x55;
         let changed = place.write("changed.mcap", changed);

@@ -49,9 +49,10 @@ fn two_runs_give_the_same_file() {
 
 #[test]
 fn the_recording_is_the_same_at_any_pace() {
-    require_reference(2, &["--pace", "realtime"]);
-    require_reference(2, &["--pace", "4"]);
-    require_reference(2, &["--set", "run.pace=1000"]);
+    let paces = [["--pace", "4"], ["--pace", "realtime"], ["--set", "run.pace=1000"]];
+    for more in first(1, "paces", paces) {
+        require_reference(2, &more);
+    }
 }
 
 #[test]
@@ -102,8 +103,9 @@ fn the_recording_is_the_same_on_any_core() {
 #[test]
 fn the_recording_is_the_same_on_a_loaded_machine() {
     let _load = Load::of_threads(4);
-    require_reference(3, &[]);
-    require_reference(3, &["--pace", "4"]);
+    for more in first(1, "paces", [&["--pace", "4"][..], &[]]) {
+        require_reference(3, more);
+    }
 }
 
 #[test]

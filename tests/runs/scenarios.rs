@@ -172,7 +172,10 @@ fn follows_the_walls_at_varying_speed() {
 
 #[test]
 fn follows_the_walls_at_a_constant_distance() {
-    fly_some(&["wall-follow-constant", "wall-follow-constant-thesis"], &["wall-follow-constant"]);
+    if is_left("`follows_the_walls_at_varying_speed` follows them") {
+        return;
+    }
+    ["wall-follow-constant", "wall-follow-constant-thesis"].into_iter().for_each(fly);
 }
 
 #[test]
