@@ -1,6 +1,6 @@
 //! Commands that were not logged all the time, and flights whose commands or motion are missing.
 use crate::simulated;
-use crate::skipped::is_left;
+use crate::skipped::{is_left, quick_or};
 use flights::{Channel, Flight, FlightSet};
 use identify::report::{Estimate, Report};
 use identify::run::identify;
@@ -159,9 +159,9 @@ fn commands_that_a_finer_table_holds_are_slow() {
     require_mass_or_rival(&report);
 }
 
-/// Long flights with fewer samples of the pose, which are fitted in half of the time.
+/// Long flights with fewer samples of the pose, which are fitted in half of the time. Quick tests take shorter ones.
 fn coarse() -> Case {
-    let mut case = heavy(20.0);
+    let mut case = heavy(quick_or(10.0, 20.0, "longer flights"));
     case.plan.sensors.pose_ticks = 10;
     case
 }
@@ -289,7 +289,7 @@ fn commands_slower_than_the_motors_determine_no_lag_delay_or_inertia() {
 /// Rotor speeds that change more with the command than declared: neither a lighter body nor more thrust.
 #[test]
 fn another_slope_of_the_command_map_is_named() {
-    if is_left("the confusion of effects has other motors") {
+    if is_left("`each_effect_is_named_and_no_other_second_third` names effects of motors") {
         return;
     }
     let mut case = Case::null(83, 20.0);
