@@ -465,7 +465,7 @@ mod tests {
             found.simpler(&now, std::slice::from_ref(&mass), &[], None)
         };
         let Some(Revision::Instead(exchange, old)) = exchanged(1.0) else { panic!("no exchange") };
-        assert_eq!(exchange.accepted, [mass.clone()]);
+        assert_eq!(exchange.accepted, std::slice::from_ref(&mass));
         assert_eq!(old.len(), 2);
         let worse = exchanged(0.5);
         assert!(worse.is_none(), "{worse:?}");

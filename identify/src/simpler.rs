@@ -187,7 +187,7 @@ mod tests {
         let base = problem.fitted(&problem.model.parameters.baseline(), &free_parameters(&accepted));
         let found = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&weak), &[]);
         assert_eq!(found.len(), 1, "{found:?}");
-        assert_eq!(found[0].accepted, [weak.clone()]);
+        assert_eq!(found[0].accepted, std::slice::from_ref(&weak));
         assert_eq!(found[0].fitted.free, weak.free, "no parameter twice");
     }
 
