@@ -164,12 +164,13 @@ impl Rapier {
             free_bodies,
             model,
         };
+        let bodies = scene.bodies().count();
         let record = Record {
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX, crash_speed_m_s),
-            held: Held::new(scene.bodies().count(), scene.joints.len()),
+            held: Held::new(bodies, scene.joints.len()),
             unsolved: None,
         };
-        let motion = Motion { system, world, record, scratch: Scratch::new() };
+        let motion = Motion { system, world, record, scratch: Scratch::new(bodies) };
         let others = Vec::with_capacity(TRAFFIC_MAX);
         let names = scene.things().map(|thing| thing.name().to_owned()).collect();
         let fingerprint = motion.system.model.airframe().fingerprint(NAME);

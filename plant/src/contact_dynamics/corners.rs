@@ -1,12 +1,16 @@
 //! Corners of convex meshes that parry leaves out.
 //!
 //! Parry finds contacts of the first four corners of a face. A face with more corners would stand on these alone, and its other
-//! corners would sink.
+//! corners would sink. This module adds the others, at most [`LARGEST`] for a face that touches, so that the buffers of a
+//! step suffice for any mesh.
 
 use super::rim::gap;
-use rapier3d_f64::geometry::Collider;
+use super::sheet::Manifold;
+use rapier3d_f64::geometry::{Collider, TriMesh};
 use rapier3d_f64::math::{Pose, Vector};
-use rapier3d_f64::parry::shape::ConvexPolyhedron;
+use rapier3d_f64::parry::query::PointQuery;
+use rapier3d_f64::parry::shape::{ConvexPolyhedron, Triangle};
+use std::f64::consts::TAU;
 
 /// Corners of a face that parry uses.
 const CORNERS: u32 = 4;
@@ -14,50 +18,259 @@ const CORNERS: u32 = 4;
 /// Points that are nearer to each other are one. Tuned, no source.
 const SAME_M: f64 = 1e-4;
 
-/// Passes to `tell` the corners of large faces that are within `margin_m` and not among the points `found` on the part, as
-/// the nearest points of `thing` and of `part`, and the gap. `normal` points from the thing to the part.
-pub(super) fn missing(
-    thing: (&Collider, &Pose),
-    part: (&Collider, &Pose),
-    normal: Vector,
-    margin_m: f64,
-    found: impl Iterator<Item = Vector> + Clone,
-    mut tell: impl FnMut([Vector; 2], f64),
-) {
-    // No normal was found. Triangles of a mesh would each add the same corners.
-    if normal == Vector::ZERO || thing.0.shape().as_composite_shape().is_some() {
-        return;
+/// Cosine of the angle between two normals of one point above which the two are one contact. Tuned, no source.
+const SAME_WAY: f64 = 0.999;
+
+/// Directions around the normal in which the extreme corner is kept: each corner of a face with sixteen. Tuned, no source.
+const DIRECTIONS: usize = 16;
+
+/// Corners that are kept because they are the lowest: the one that a body rolls over, and its neighbours.
+const LOWEST: usize = 3;
+
+/// Corners of a face that are kept, beside those that parry uses.
+pub(super) const LARGEST: usize = DIRECTIONS + LOWEST;
+
+/// Faces of a mesh of triangles on which corners of one body are kept. Tuned, no source.
+const FACES: usize = 8;
+
+/// Cosine of the angle between two triangles above which they are one face. Tuned, no source.
+const SAME_FACE: f64 = 1.0 - 1e-6;
+
+/// A corner this far beside a triangle is above it: rounding. Tuned, no source.
+const BESIDE_M: f64 = 1e-6;
+
+/// A contact at a corner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    /// The nearest points of the thing and of the part.
+    pub ends: [Vector; 2],
+    /// The normal, which points from the thing to the part.
+    pub normal: Vector,
+    pub gap_m: f64,
+}
+
+impl Corner {
+    /// A corner of the part.
+    fn of_part(place: Vector, normal: Vector, gap_m: f64) -> Self {
+        Self { ends: [place - normal * gap_m, place], normal, gap_m }
     }
-    let is_new = |place: Vector| found.clone().all(|point| (point - place).length() > SAME_M);
-    for (corner, gap_m) in near(part, thing, normal, margin_m) {
-        if is_new(corner) {
-            tell([corner - normal * gap_m, corner], gap_m);
-        }
+
+    /// A corner of the thing.
+    fn of_thing(place: Vector, normal: Vector, gap_m: f64) -> Self {
+        Self { ends: [place, place + normal * gap_m], normal, gap_m }
     }
-    for (corner, gap_m) in near(thing, part, -normal, margin_m) {
-        let place = corner + normal * gap_m;
-        if is_new(place) {
-            tell([corner, place], gap_m);
-        }
+
+    /// True if this is the contact at a `place` on the part along `normal`.
+    fn is_at(&self, place: Vector, normal: Vector) -> bool {
+        (self.ends[1] - place).length() <= SAME_M && self.normal.dot(normal) > SAME_WAY
     }
 }
 
-/// Corners of a convex mesh with large faces that are within `margin_m` of another shape along `normal`, with their gaps.
+/// Passes to `tell` the corners of large faces that are within `margin_m` and not among the points of `manifolds`.
+pub(super) fn missing(
+    thing: (&Collider, &Pose),
+    part: (&Collider, &Pose),
+    margin_m: f64,
+    manifolds: &[Manifold],
+    mut tell: impl FnMut(Corner),
+) {
+    if corners(thing.0).is_empty() && corners(part.0).is_empty() {
+        return;
+    }
+    if let Some(mesh) = thing.0.shape().as_trimesh() {
+        on_triangles((mesh, thing.1), part, margin_m, manifolds, tell);
+        return;
+    }
+    // There is one.
+    for manifold in manifolds {
+        missing_of_one(thing, part, margin_m, manifold, &mut tell);
+    }
+}
+
+/// The same between two solids, of a corner that belongs to both once.
+fn missing_of_one(
+    thing: (&Collider, &Pose),
+    part: (&Collider, &Pose),
+    margin_m: f64,
+    manifold: &Manifold,
+    tell: impl FnMut(Corner),
+) {
+    let normal = thing.1.rotation * manifold.local_n1;
+    // No normal was found.
+    if normal == Vector::ZERO {
+        return;
+    }
+    let found = manifold.points.iter().map(|point| part.1.transform_point(point.local_p2));
+    let is_new = |place: Vector| found.clone().all(|point| (point - place).length() > SAME_M);
+    let mut kept = Kept::around(normal, part.1);
+    for (place, gap_m) in near(part, thing, normal, margin_m) {
+        if is_new(place) {
+            kept.add(Corner::of_part(place, normal, gap_m));
+        }
+    }
+    for (place, gap_m) in near(thing, part, -normal, margin_m) {
+        if is_new(place + normal * gap_m) {
+            kept.add(Corner::of_thing(place, normal, gap_m));
+        }
+    }
+    kept.each(tell);
+}
+
+/// The same of the part's corners over a mesh of triangles: each once for a face, however many triangles that has.
+fn on_triangles(
+    (mesh, pose): (&TriMesh, &Pose),
+    part: (&Collider, &Pose),
+    margin_m: f64,
+    manifolds: &[Manifold],
+    mut tell: impl FnMut(Corner),
+) {
+    let points = manifolds.iter().flat_map(|manifold| {
+        let normal = pose.rotation * manifold.local_n1;
+        manifold.points.iter().map(move |point| (part.1.transform_point(point.local_p2), normal))
+    });
+    let (mut faces, mut count) = ([Vector::ZERO; FACES], 0);
+    for manifold in manifolds {
+        // Over the edge to another face a triangle pushes in another direction.
+        let Some((_, face)) = facing(mesh, manifold, manifold.local_n1, SAME_WAY) else { continue };
+        if count == FACES || faces[..count].iter().any(|other| other.dot(face) > SAME_FACE) {
+            continue;
+        }
+        (faces[count], count) = (face, count + 1);
+        let mut kept = Kept::around(pose.rotation * face, part.1);
+        let triangles = manifolds.iter().filter_map(|manifold| facing(mesh, manifold, face, SAME_FACE));
+        for (triangle, local_normal) in triangles {
+            let normal = pose.rotation * local_normal;
+            for place in lowest(part, normal, margin_m) {
+                let gap_m = above_m(&triangle, local_normal, pose.inverse_transform_point(place));
+                // A corner that is deep below came from the other side.
+                let Some(gap_m) = gap_m.filter(|gap_m| gap_m.abs() < margin_m) else { continue };
+                let corner = Corner::of_part(place, normal, gap_m);
+                if !points.clone().any(|(point, along)| corner.is_at(point, along)) {
+                    kept.add(corner);
+                }
+            }
+        }
+        kept.each(&mut tell);
+    }
+}
+
+/// The triangle of a manifold, and its normal on the side of `way`; none if the cosine of their angle is not above `least`.
+fn facing(mesh: &TriMesh, manifold: &Manifold, way: Vector, least: f64) -> Option<(Triangle, Vector)> {
+    let triangle = mesh.triangle(manifold.subshape1);
+    let normal = triangle.normal()?;
+    let along = normal.dot(way);
+    (along.abs() > least).then(|| (triangle, normal * along.signum()))
+}
+
+/// Height of a point above a triangle; none where it is beside it.
+fn above_m(triangle: &Triangle, normal: Vector, point: Vector) -> Option<f64> {
+    let gap_m = normal.dot(point - triangle.a);
+    let foot = point - normal * gap_m;
+    let beside_m = (triangle.project_local_point(foot, false).point - foot).length();
+    (beside_m <= BESIDE_M).then_some(gap_m)
+}
+
+/// Corners of a solid that are within `margin_m` of another shape along `normal`, with their gaps.
 fn near(
-    (solid, pose): (&Collider, &Pose),
+    solid: (&Collider, &Pose),
     other: (&Collider, &Pose),
     normal: Vector,
     margin_m: f64,
 ) -> impl Iterator<Item = (Vector, f64)> {
-    let solid = solid.shape().as_convex_polyhedron().filter(|solid| has_large_face(solid));
-    let corners = solid.map_or(&[][..], ConvexPolyhedron::points);
-    let placed = corners.iter().map(move |corner| pose.transform_point(*corner));
-    let least_m = placed.clone().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
-    // Corners that are farther from the nearest one cannot touch.
-    let lowest = placed.filter(move |corner| corner.dot(normal) < least_m + 2.0 * margin_m);
+    let lowest = lowest(solid, normal, margin_m);
     lowest.filter_map(move |corner| gap(other, corner, normal)).filter(move |(_, gap_m)| *gap_m < margin_m)
+}
+
+/// The placed corners of a solid, without those that are too far from the lowest one along `normal` to touch.
+fn lowest((solid, pose): (&Collider, &Pose), normal: Vector, margin_m: f64) -> impl Iterator<Item = Vector> {
+    let placed = corners(solid).iter().map(move |corner| pose.transform_point(*corner));
+    let least_m = placed.clone().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
+    placed.filter(move |corner| corner.dot(normal) < least_m + 2.0 * margin_m)
+}
+
+/// The corners of a convex mesh with large faces; none of other shapes.
+fn corners(solid: &Collider) -> &[Vector] {
+    let solid = solid.shape().as_convex_polyhedron().filter(|solid| has_large_face(solid));
+    solid.map_or(&[][..], ConvexPolyhedron::points)
 }
 
 fn has_large_face(solid: &ConvexPolyhedron) -> bool {
     solid.faces().iter().any(|face| face.num_vertices_or_edges > CORNERS)
+}
+
+/// Corners of one face: all of them, if they are no more than [`LARGEST`]; otherwise those that span the face, and the lowest.
+/// Ties go to the first corner of the mesh, so that rounding alone does not choose.
+struct Kept {
+    count: usize,
+    first: [Option<Corner>; LARGEST],
+    directions: [Vector; DIRECTIONS],
+    extreme: [Option<Ranked>; DIRECTIONS],
+    lowest: [Option<Ranked>; LOWEST],
+}
+
+/// A corner with its number among those that were added, and its reach along a direction.
+#[derive(Debug, Clone, Copy)]
+struct Ranked {
+    number: usize,
+    reach_m: f64,
+    corner: Corner,
+}
+
+impl Kept {
+    /// No corners so far of a face along `normal`. The directions turn with the part, so that one that stands keeps its corners.
+    fn around(normal: Vector, part: &Pose) -> Self {
+        let (along, across) = (part.rotation.inverse() * normal).any_orthonormal_pair();
+        let (along, across) = (part.rotation * along, part.rotation * across);
+        let directions = std::array::from_fn(|number| {
+            let (sin, cos) = libm::sincos(TAU * number as f64 / DIRECTIONS as f64);
+            along * cos + across * sin
+        });
+        let (first, extreme, lowest) = ([None; LARGEST], [None; DIRECTIONS], [None; LOWEST]);
+        Self { count: 0, first, directions, extreme, lowest }
+    }
+
+    /// Adds a corner, unless it is there.
+    fn add(&mut self, corner: Corner) {
+        if self.first.iter().flatten().any(|other| other.is_at(corner.ends[1], corner.normal)) {
+            return;
+        }
+        if let Some(free) = self.first.get_mut(self.count) {
+            *free = Some(corner);
+        }
+        let number = self.count;
+        self.count += 1;
+        for (direction, extreme) in self.directions.iter().zip(&mut self.extreme) {
+            // Of two corners above each other the lower one.
+            let reach_m = corner.ends[1].dot(*direction) - corner.gap_m;
+            if extreme.is_none_or(|other| reach_m > other.reach_m) {
+                *extreme = Some(Ranked { number, reach_m, corner });
+            }
+        }
+        let mut next = Some(Ranked { number, reach_m: -corner.gap_m, corner });
+        for low in &mut self.lowest {
+            let is_lower = next.is_some_and(|one| low.is_none_or(|other| one.reach_m > other.reach_m));
+            if is_lower {
+                std::mem::swap(low, &mut next);
+            }
+        }
+    }
+
+    /// Passes the corners that are kept to `tell`: first those that span the face, which stay the same while it stands.
+    fn each(&self, mut tell: impl FnMut(Corner)) {
+        if self.count <= LARGEST {
+            self.first.iter().flatten().for_each(|corner| tell(*corner));
+            return;
+        }
+        let mut extreme = self.extreme;
+        extreme.sort_unstable_by_key(|it| it.map(|it| it.number));
+        let mut told: [Option<Corner>; LARGEST] = [None; LARGEST];
+        let ranked = extreme.iter().chain(&self.lowest).flatten();
+        for (place, Ranked { corner, .. }) in ranked.enumerate() {
+            let mut before = told.iter().flatten();
+            if !before.any(|other| other.is_at(corner.ends[1], corner.normal)) {
+                told[place] = Some(*corner);
+                tell(*corner);
+            }
+        }
+    }
 }

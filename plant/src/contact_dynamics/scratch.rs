@@ -33,10 +33,11 @@ pub(super) struct Twists {
 }
 
 impl Scratch {
-    pub(super) fn new() -> Self {
-        let bodies = || Vec::with_capacity(FIRST_BODY + TRAFFIC_MAX);
-        let twists = Twists { now: bodies(), then: bodies(), before: bodies() };
-        Self { touching: Touching::new(), twists, ..Self::default() }
+    /// Empty buffers, for a vehicle among so many free bodies.
+    pub(super) fn new(bodies: usize) -> Self {
+        let all = || Vec::with_capacity(FIRST_BODY + bodies + TRAFFIC_MAX);
+        let twists = Twists { now: all(), then: all(), before: all() };
+        Self { touching: Touching::new(bodies), twists, ..Self::default() }
     }
 
     /// Finds the impulses and gives them to the bodies at the step's end.

@@ -2,6 +2,7 @@
 //!
 //! The search for the impulses of these constraints is in `scratch`.
 
+use super::corners;
 use super::solver::{Body, Unilateral};
 use super::world::Near;
 use nalgebra::Vector3;
@@ -9,8 +10,21 @@ use nalgebra::Vector3;
 /// Greatest gap of a contact: far below anything visible, far above rounding. Tuned, no source.
 pub(super) const TOUCH_M: f64 = 1e-6;
 
-/// As many constraints as a vehicle has in a corner among others, and as many again: more take memory.
-pub(super) const CONSTRAINTS: usize = 64;
+/// As many constraints as a vehicle has in a corner among others, and as many again.
+const CONSTRAINTS: usize = 64;
+
+/// Contacts that parry finds between two solids at most: the corners of two faces of four corners, or where their edges cross,
+/// and the nearest point.
+const PARRY_CONTACTS: usize = 9;
+
+/// Constraints for each free body, as many as two large faces have.
+const BODY_CONSTRAINTS: usize = PARRY_CONTACTS + corners::LARGEST;
+
+/// Number of constraints that the buffers hold among so many free bodies. The excess takes memory in flight, and its search
+/// begins with no impulses. A stack on the ground has less, whatever the faces of its bodies.
+pub(super) const fn room(bodies: usize) -> usize {
+    CONSTRAINTS + BODY_CONSTRAINTS * bodies
+}
 
 /// Buffers of the contacts and stops.
 #[derive(Default)]
@@ -23,9 +37,9 @@ pub(super) struct Touching {
 }
 
 impl Touching {
-    /// Empty buffers.
-    pub(super) fn new() -> Self {
-        let (near, constraints) = (Vec::with_capacity(CONSTRAINTS), Vec::with_capacity(CONSTRAINTS));
+    /// Empty buffers, for a vehicle among so many free bodies.
+    pub(super) fn new(bodies: usize) -> Self {
+        let (near, constraints) = (Vec::with_capacity(room(bodies)), Vec::with_capacity(room(bodies)));
         Self { near, constraints, ropes: Vec::new() }
     }
 

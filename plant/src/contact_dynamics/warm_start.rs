@@ -2,14 +2,10 @@
 //!
 //! They are part of the state of a flight: where the search starts decides the last digits of what it finds.
 
-use super::touching::{CONSTRAINTS, Touching};
+use super::touching::{self, Touching};
 use super::world::Near;
 use crate::saved::{Bounded, saved_fields};
 use nalgebra::Vector3;
-
-/// Impulses of contacts that are kept for each free body; the search for more begins with none. Tuned, no source: the most
-/// that a scene of this repository has is 11, among six bodies and the vehicle.
-const BODY_CONTACTS: usize = 16;
 
 /// Stops of a rig at most: two along each axis, and that of its tilt.
 const RIG_STOPS: usize = 7;
@@ -39,9 +35,8 @@ saved_fields!(Held { contacts, stops_N_s });
 impl Held {
     /// No impulses so far, of a vehicle among `bodies` free bodies and `joints`.
     pub(super) fn new(bodies: usize, joints: usize) -> Self {
-        let contacts = CONSTRAINTS + BODY_CONTACTS * bodies;
         let stops = RIG_STOPS + JOINT_STOPS * joints;
-        Self { contacts: Bounded::new(contacts), stops_N_s: Bounded::new(stops) }
+        Self { contacts: Bounded::new(touching::room(bodies)), stops_N_s: Bounded::new(stops) }
     }
 
     pub(super) fn clear(&mut self) {

@@ -4,7 +4,7 @@
 //! result depends on the poses alone.
 
 use super::body::{self, from_rapier, to_rapier};
-use super::corners;
+use super::corners::{self, Corner};
 use super::free_bodies::{FIRST_BODY, FIRST_THING, VEHICLE, WORLD};
 use super::hull::Hull;
 use super::rim;
@@ -15,7 +15,9 @@ use nalgebra::{Unit, Vector3};
 use rapier3d_f64::geometry::{Collider, ColliderBuilder};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::parry::bounding_volume::{Aabb, BoundingVolume};
-use rapier3d_f64::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test};
+use rapier3d_f64::parry::query::{
+    DefaultQueryDispatcher, PersistentQueryDispatcher, contact, intersection_test,
+};
 use scenes::{Scene, Surface, Thing};
 use std::f64::consts::FRAC_PI_2;
 
@@ -27,7 +29,7 @@ pub(super) const FEET: u32 = 0b1111;
 pub(super) const DISC: u32 = 0b1_0000;
 const FIRST_NEIGHBOUR: u32 = 1000;
 
-/// Free bodies that overlap more than this at the start are told: tuned, no source.
+/// The vehicle and free bodies that overlap anything by more than this at the start are told: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
 
 /// The vehicle and its surroundings.
@@ -245,9 +247,32 @@ impl World {
     pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
         let mut found = Vec::new();
         self.find_near_bodies(vehicle, states, 0.0, &mut found);
-        let near = found.iter().find(|near| near.gap_m < -OVERLAP_M)?;
+        // A triangle that is touched at its edge may tell of more depth than there is.
+        let is_overlap = |near: &&Near| near.gap_m < -OVERLAP_M && self.is_overlap(near, vehicle, states);
+        let near = found.iter().find(is_overlap)?;
         let second = self.bodies.get(near.bodies[1].wrapping_sub(FIRST_BODY));
         Some([near.object, second.map_or(0, |body| body.collider.user_data as u32)])
+    }
+
+    /// True if the two that are `near` each other overlap.
+    fn is_overlap(&self, near: &Near, vehicle: &RigidBody, states: &[RigidBody]) -> bool {
+        let place = |number: usize| match number {
+            WORLD => {
+                let thing = self.things.iter().find(|it| it.collider.user_data == u128::from(near.object))?;
+                Some((&thing.collider, *thing.collider.position()))
+            }
+            VEHICLE => {
+                let part = self.hull.get(near.part.trailing_zeros() as usize)?;
+                Some((part, body::pose(vehicle) * *part.position()))
+            }
+            _ => {
+                let number = number.checked_sub(FIRST_BODY)?;
+                let (moving, state) = (self.bodies.get(number)?, states.get(number)?);
+                Some((&moving.collider, body::pose(state) * *moving.collider.position()))
+            }
+        };
+        let [Some((one, pose)), Some((other, other_pose))] = near.bodies.map(place) else { return true };
+        overlap((one, &pose), (other, &other_pose))
     }
 
     /// Iterates over the greatest distance of any point of each free body from its centre of mass.
@@ -266,9 +291,7 @@ impl World {
     pub(super) fn thing_around(&self, body: &RigidBody) -> Option<usize> {
         let pose = body::pose(body);
         let meets = |thing: &Collider, part: &Collider| {
-            let place = pose * *part.position();
-            let found = intersection_test(&place, part.shape(), thing.position(), thing.shape());
-            found.is_ok_and(|found| found.intersecting)
+            overlap((part, &(pose * *part.position())), (thing, thing.position()))
         };
         let mut things = self.things.iter().skip(1).map(|thing| &thing.collider);
         let around = things.find(|thing| self.hull.iter().any(|part| meets(thing, part)))?;
@@ -304,7 +327,7 @@ fn meet(
     tell((thing, thing_pose), (part, part_pose), margin_m, manifolds, note);
 }
 
-/// Notes every point of `manifolds` that is within the margin, and the rim's ends that they lack.
+/// Notes every point of `manifolds` that is within the margin, and the rim's ends and the corners that they lack.
 fn tell(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),
@@ -312,38 +335,47 @@ fn tell(
     manifolds: &[Manifold],
     mut note: impl FnMut(Near),
 ) {
-    let ((thing, thing_pose), (part, part_pose)) = (thing, part);
     for manifold in manifolds {
-        let normal = thing_pose.rotation * manifold.local_n1;
-        let mut tell = |ends: [Vector; 2], gap_m: f64| {
-            note(Near {
-                object: thing.user_data as u32,
-                part: 0,
-                bodies: [WORLD, VEHICLE],
-                neighbour: None,
-                point_W_m: (from_rapier(ends[0]) + from_rapier(ends[1])) / 2.0,
-                normal_W: from_rapier(normal),
-                gap_m,
-                friction: thing.friction(),
-                restitution: thing.restitution(),
-            });
-        };
+        let normal = thing.1.rotation * manifold.local_n1;
+        let mut tell = |ends: [Vector; 2], gap_m: f64| note(near(thing.0, normal, ends, gap_m));
         for point in manifold.points.iter().filter(|point| point.dist < margin_m) {
-            let ends =
-                [thing_pose.transform_point(point.local_p1), part_pose.transform_point(point.local_p2)];
+            let ends = [thing.1.transform_point(point.local_p1), part.1.transform_point(point.local_p2)];
             tell(ends, point.dist);
         }
         if !manifold.points.is_empty() {
-            let found = manifold.points.iter().map(|point| part_pose.transform_point(point.local_p2));
-            rim::missing_ends((thing, thing_pose), (part, part_pose), normal, found, |ends, gap_m| {
+            let found = manifold.points.iter().map(|point| part.1.transform_point(point.local_p2));
+            rim::missing_ends(thing, part, normal, found, |ends, gap_m| {
                 if gap_m < margin_m {
                     tell(ends, gap_m);
                 }
             });
         }
-        let found = manifold.points.iter().map(|point| part_pose.transform_point(point.local_p2));
-        corners::missing((thing, thing_pose), (part, part_pose), normal, margin_m, found, &mut tell);
     }
+    corners::missing(thing, part, margin_m, manifolds, |Corner { ends, normal, gap_m }| {
+        note(near(thing.0, normal, ends, gap_m));
+    });
+}
+
+/// A point where the vehicle may touch a still `thing`, between the nearest points of both.
+fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near {
+    Near {
+        object: thing.user_data as u32,
+        part: 0,
+        bodies: [WORLD, VEHICLE],
+        neighbour: None,
+        point_W_m: (from_rapier(ends[0]) + from_rapier(ends[1])) / 2.0,
+        normal_W: from_rapier(normal),
+        gap_m,
+        friction: thing.friction(),
+        restitution: thing.restitution(),
+    }
+}
+
+/// True if two shapes overlap by more than rounding. Touching is no overlap.
+fn overlap((one, pose): (&Collider, &Pose), (other, other_pose): (&Collider, &Pose)) -> bool {
+    let met = intersection_test(pose, one.shape(), other_pose, other.shape());
+    let deepest = || contact(pose, one.shape(), other_pose, other.shape(), 0.0).ok().flatten();
+    met.is_ok_and(|found| found.intersecting) && deepest().is_none_or(|found| found.dist < -OVERLAP_M)
 }
 
 fn numbers(collider: &Collider) -> Vec<f64> {
