@@ -274,3 +274,94 @@ impl Kept {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d_f64::geometry::{ColliderBuilder, SharedShape};
+
+    const RADIUS_M: f64 = 0.1;
+    const MARGIN_M: f64 = 2e-3;
+
+    /// An upright prism with its middle at the origin, 0.2 m high.
+    fn prism(sides: u32) -> Collider {
+        let corner = |side: u32, z: f64| {
+            let (sin, cos) = libm::sincos(TAU * f64::from(side) / f64::from(sides));
+            Vector::new(RADIUS_M * cos, RADIUS_M * sin, z)
+        };
+        let corners =
+            (0..2 * sides).map(|it| corner(it % sides, if it < sides { -0.1 } else { 0.1 })).collect();
+        let walls = (0..sides).flat_map(|one| {
+            let two = (one + 1) % sides;
+            [[one, two, two + sides], [one, two + sides, one + sides]]
+        });
+        let ends = (1..sides - 1).flat_map(|it| [[0, it + 1, it], [sides, sides + it, sides + it + 1]]);
+        let faces: Vec<[u32; 3]> = walls.chain(ends).collect();
+        ColliderBuilder::new(SharedShape::convex_mesh(corners, &faces).unwrap()).build()
+    }
+
+    /// The contacts at corners of `part` above `thing`, along z, where parry found none.
+    fn found(thing: (&Collider, &Pose), part: (&Collider, &Pose)) -> Vec<Corner> {
+        let mut manifold = Manifold::with_data(0, 0, ());
+        manifold.local_n1 = Vector::Z;
+        let mut found = Vec::new();
+        missing(thing, part, MARGIN_M, &[manifold], |corner| found.push(corner));
+        found
+    }
+
+    #[test]
+    fn a_corner_that_two_prisms_share_is_one_contact() {
+        for sides in [8, 16] {
+            let prism = prism(sides);
+            let above = Pose::from_translation(Vector::Z * 0.201);
+            let found = found((&prism, &Pose::IDENTITY), (&prism, &above));
+            assert_eq!(found.len(), sides as usize);
+            assert!(found.iter().all(|corner| (corner.gap_m - 1e-3).abs() < 1e-6), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_face_of_many_corners_stands_on_few_that_span_it_and_on_the_lowest() {
+        let ground = ColliderBuilder::cuboid(1.0, 1.0, 1.0).build();
+        let below = Pose::from_translation(-Vector::Z);
+        for (sides, tilt_rad) in [(19, 0.0), (20, 0.0), (300, 0.0), (300, 1e-3), (900, -2e-3)] {
+            let prism = prism(sides);
+            let place = Pose::new(Vector::Z * 0.1005, Vector::new(tilt_rad, tilt_rad / 3.0, 0.0));
+            let found = found((&ground, &below), (&prism, &place));
+            let count = found.len();
+            assert!((16..=LARGEST).contains(&count), "{sides} sides: {count}");
+            let corners = || corners(&prism).iter().map(|corner| place.transform_point(*corner));
+            let lowest_m = corners().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
+            let least_m = found.iter().map(|corner| corner.gap_m).fold(f64::INFINITY, f64::min);
+            assert!((least_m - lowest_m).abs() < 1e-9, "{sides} sides: {least_m} m, not {lowest_m} m");
+            for number in 0..64 {
+                let (sin, cos) = libm::sincos(TAU * f64::from(number) / 64.0);
+                let reach_m = found.iter().map(|it| it.ends[1].dot(Vector::new(cos, sin, 0.0)));
+                let reach_m = reach_m.fold(0.0, f64::max);
+                assert!(reach_m > 0.94 * RADIUS_M, "{sides} sides: {reach_m} m in direction {number}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_touches_each_face_of_a_mesh_of_triangles_once() {
+        // A square of four triangles around the middle.
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]];
+        let corners = corners.map(|[x, y]| Vector::new(x, y, 0.0)).to_vec();
+        let faces = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+        let floor = ColliderBuilder::new(SharedShape::trimesh(corners, faces).unwrap()).build();
+        let (prism, place) = (prism(8), Pose::from_translation(Vector::Z * 0.1005));
+        let manifolds = [0, 1, 2, 3].map(|number| {
+            let mut manifold = Manifold::with_data(number, 0, ());
+            manifold.local_n1 = Vector::Z;
+            manifold
+        });
+        let mut found = Vec::new();
+        let told = |corner: Corner| found.push(corner);
+        missing((&floor, &Pose::IDENTITY), (&prism, &place), MARGIN_M, &manifolds, told);
+        assert_eq!(found.len(), 8);
+        for corner in found {
+            assert!((corner.gap_m - 5e-4).abs() < 1e-9 && corner.normal == Vector::Z, "{corner:?}");
+        }
+    }
+}

@@ -12,7 +12,7 @@ use super::sheet::{Borders, Manifold};
 use crate::backend::Neighbour;
 use crate::state::RigidBody;
 use nalgebra::{Unit, Vector3};
-use rapier3d_f64::geometry::{Collider, ColliderBuilder};
+use rapier3d_f64::geometry::{Collider, ColliderBuilder, Shape};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d_f64::parry::query::{
@@ -29,7 +29,7 @@ pub(super) const FEET: u32 = 0b1111;
 pub(super) const DISC: u32 = 0b1_0000;
 const FIRST_NEIGHBOUR: u32 = 1000;
 
-/// The vehicle and free bodies that overlap anything by more than this at the start are told: tuned, no source.
+/// Shapes that overlap by no more than this touch each other: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
 
 /// The vehicle and its surroundings.
@@ -247,32 +247,9 @@ impl World {
     pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
         let mut found = Vec::new();
         self.find_near_bodies(vehicle, states, 0.0, &mut found);
-        // A triangle that is touched at its edge may tell of more depth than there is.
-        let is_overlap = |near: &&Near| near.gap_m < -OVERLAP_M && self.is_overlap(near, vehicle, states);
-        let near = found.iter().find(is_overlap)?;
+        let near = found.iter().find(|near| near.gap_m < -OVERLAP_M)?;
         let second = self.bodies.get(near.bodies[1].wrapping_sub(FIRST_BODY));
         Some([near.object, second.map_or(0, |body| body.collider.user_data as u32)])
-    }
-
-    /// True if the two that are `near` each other overlap.
-    fn is_overlap(&self, near: &Near, vehicle: &RigidBody, states: &[RigidBody]) -> bool {
-        let place = |number: usize| match number {
-            WORLD => {
-                let thing = self.things.iter().find(|it| it.collider.user_data == u128::from(near.object))?;
-                Some((&thing.collider, *thing.collider.position()))
-            }
-            VEHICLE => {
-                let part = self.hull.get(near.part.trailing_zeros() as usize)?;
-                Some((part, body::pose(vehicle) * *part.position()))
-            }
-            _ => {
-                let number = number.checked_sub(FIRST_BODY)?;
-                let (moving, state) = (self.bodies.get(number)?, states.get(number)?);
-                Some((&moving.collider, body::pose(state) * *moving.collider.position()))
-            }
-        };
-        let [Some((one, pose)), Some((other, other_pose))] = near.bodies.map(place) else { return true };
-        overlap((one, &pose), (other, &other_pose))
     }
 
     /// Iterates over the greatest distance of any point of each free body from its centre of mass.
@@ -291,7 +268,7 @@ impl World {
     pub(super) fn thing_around(&self, body: &RigidBody) -> Option<usize> {
         let pose = body::pose(body);
         let meets = |thing: &Collider, part: &Collider| {
-            overlap((part, &(pose * *part.position())), (thing, thing.position()))
+            overlap((part.shape(), &(pose * *part.position())), (thing.shape(), thing.position()))
         };
         let mut things = self.things.iter().skip(1).map(|thing| &thing.collider);
         let around = things.find(|thing| self.hull.iter().any(|part| meets(thing, part)))?;
@@ -332,10 +309,11 @@ fn tell(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),
     margin_m: f64,
-    manifolds: &[Manifold],
+    manifolds: &mut [Manifold],
     mut note: impl FnMut(Near),
 ) {
-    for manifold in manifolds {
+    drop_false_depths(thing, part, manifolds);
+    for manifold in &*manifolds {
         let normal = thing.1.rotation * manifold.local_n1;
         let mut tell = |ends: [Vector; 2], gap_m: f64| note(near(thing.0, normal, ends, gap_m));
         for point in manifold.points.iter().filter(|point| point.dist < margin_m) {
@@ -371,10 +349,24 @@ fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near
     }
 }
 
+/// Drops points of triangles that are deeper than a triangle that the part only touches. Where a corner of it is touched, parry
+/// may turn the normal to its face, along which the part may reach far beyond it.
+fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifolds: &mut [Manifold]) {
+    let Some(mesh) = thing.0.shape().as_trimesh() else { return };
+    for manifold in manifolds {
+        let is_deep = manifold.points.iter().any(|point| point.dist < -OVERLAP_M);
+        let triangle: &dyn Shape = &mesh.triangle(manifold.subshape1);
+        if is_deep && !overlap((triangle, thing.1), (part.0.shape(), part.1)) {
+            manifold.points.retain(|point| point.dist >= -OVERLAP_M);
+        }
+    }
+}
+
 /// True if two shapes overlap by more than rounding. Touching is no overlap.
-fn overlap((one, pose): (&Collider, &Pose), (other, other_pose): (&Collider, &Pose)) -> bool {
-    let met = intersection_test(pose, one.shape(), other_pose, other.shape());
-    let deepest = || contact(pose, one.shape(), other_pose, other.shape(), 0.0).ok().flatten();
+fn overlap((one, pose): (&dyn Shape, &Pose), (other, other_pose): (&dyn Shape, &Pose)) -> bool {
+    let met = intersection_test(pose, one, other_pose, other);
+    // Within the distance that is touching, so that only a search that fails finds nothing.
+    let deepest = || contact(pose, one, other_pose, other, OVERLAP_M).ok().flatten();
     met.is_ok_and(|found| found.intersecting) && deepest().is_none_or(|found| found.dist < -OVERLAP_M)
 }
 
@@ -440,4 +432,83 @@ impl Moving {
 fn disc(hull: &Hull, centre_m: &Vector3<f64>) -> ColliderBuilder {
     let shape = ColliderBuilder::cylinder(hull.disc_half_m, hull.disc_radius_m);
     shape.translation(to_rapier(centre_m)).rotation(Vector::X * FRAC_PI_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::airframe::Airframe;
+
+    fn given(value: &str, unit: &str) -> String {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
+    }
+
+    /// The corners, and the faces, of an upright prism that is 0.2 m high, or of a table.
+    fn obj(shape: &str) -> String {
+        let faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+        let (half_m, heights_m) = if shape == "prism.obj" { (0.1, [-0.1, 0.1]) } else { (0.3, [0.0, 0.5]) };
+        let corners = heights_m.map(|z| {
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            corners.map(|(x, y)| format!("v {} {} {z}\n", x * half_m, y * half_m)).concat()
+        });
+        format!("{}{faces}", corners.concat())
+    }
+
+    fn mesh(name: &str, position: [f64; 3], solid: &str, more: &str) -> String {
+        let (position, scale) = (given(&format!("{position:?}"), "m"), given("1", "m"));
+        let keys = format!("position = {position}\nscale = {scale}\nsolid = \"{solid}\"\n{more}");
+        format!("[[meshes]]\nname = \"{name}\"\nfile = \"{name}.obj\"\n{keys}")
+    }
+
+    /// The world of a scene, and its bodies where they start.
+    fn world(parts: &[String]) -> (World, Vec<RigidBody>) {
+        let text = format!("name = \"test\"\n{}", parts.concat());
+        let read = |path: &std::path::Path| {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            Ok(obj(name).into_bytes())
+        };
+        let scene = Scene::parse_with(&text, "test.toml", &read);
+        let scene = scene.unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let vehicle = vehicles::Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let start = |body: &scenes::FreeBody| RigidBody {
+            attitude_WB: body.attitude_W,
+            ..RigidBody::level_at(body.centre_W_m)
+        };
+        let states = scene.bodies().map(|(_, body)| start(body)).collect();
+        (World::new(&Hull::of(&Airframe::new(vehicle)), &scene, Vec::new()), states)
+    }
+
+    /// Where its top overhangs a corner of the table, a triangle of the table's side told of a depth of centimetres.
+    #[test]
+    fn a_body_that_touches_a_mesh_is_not_inside_of_it() {
+        let far = RigidBody::level_at(Vector3::z() * 50.0);
+        for (x_m, y_m) in [(0.25, -0.25), (0.278, -0.22), (0.0, 0.31), (0.0, 0.0)] {
+            for yaw in ["0", "3.2", "20", "45"] {
+                for height_m in [0.0, 0.4, 0.794] {
+                    for (deep_m, expected) in [(0.0, None), (0.01, Some([3, 2]))] {
+                        let more = format!("mass = {}\nyaw = {}\n", given("1", "kg"), given(yaw, "deg"));
+                        let place = [x_m, y_m, height_m + 0.5 + 0.1 - deep_m];
+                        let parts = [
+                            mesh("prism", place, "convex", &more),
+                            mesh("table", [0.0, 0.0, height_m], "triangles", ""),
+                        ];
+                        let (mut world, states) = world(&parts);
+                        let found = world.overlap(&far, &states);
+                        assert_eq!(found, expected, "{place:?}, turned by {yaw} deg");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_on_a_mesh_is_not_inside_of_it() {
+        for solid in ["convex", "triangles"] {
+            let (world, _) = world(&[mesh("table", [0.0, 0.0, 0.2], solid, "")]);
+            for (off_m, expected) in [(0.0, None), (1e-9, None), (-1e-9, None), (-0.005, Some(0))] {
+                let body = RigidBody::level_at(Vector3::z() * (0.7 + 0.06 + off_m));
+                assert_eq!(world.thing_around(&body), expected, "{solid}, {off_m} m");
+            }
+        }
+    }
 }
