@@ -16,6 +16,7 @@ mod free_bodies;
 mod free_flight;
 mod golden;
 mod motors;
+mod prisms;
 mod rigs;
 mod signs;
 mod snapshots;

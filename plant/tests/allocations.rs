@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::parts::{Prism, keys};
 use common::{TICK_S, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
@@ -78,6 +79,37 @@ fn only_the_search_for_contacts_takes_memory() {
     // What was counted: 0, 1000, 13157 and 0, and of what is not 0 a tenth more.
     for ((name, count), most) in counts.into_iter().zip([0, 1_100, 14_500, 0]) {
         assert!(count <= most, "{name}: {count} times in 1000 ticks, expected {most} at most");
+    }
+}
+
+/// Returns the number of allocations of a prism with so many sides that falls 0.1 m, bounces and stands, from a moment in the
+/// air on.
+fn taken_by_prism(sides: u32) -> u64 {
+    let obj = Prism { sides, radius_m: 0.12, half_m: 0.1 }.obj();
+    let keys = keys(&[("mass", "1", "kg"), ("position", "[0, 0, 0.2]", "m"), ("scale", "1", "m")]);
+    let mesh = "[[meshes]]\nname = \"prism\"\nfile = \"prism.obj\"\nsolid = \"convex\"\n";
+    let text = format!("name = \"test\"\n{mesh}{keys}");
+    let scene = Scene::parse_with(&text, "test.toml", &|_| Ok(obj.clone().into_bytes())).unwrap();
+    let mut plant = common::rapier(model(), &scene, &RigidBody::level_at(Vector3::z() * 20.0), 1.0);
+    let hover = [hummingbird().hover_command(); 4];
+    plant.settle_rotors(&hover);
+    (0..100).for_each(|_| plant.step(&hover, TICK_S, &[]));
+    let before = TAKEN.get();
+    (0..1_000).for_each(|_| plant.step(&hover, TICK_S, &[]));
+    let taken = TAKEN.get() - before;
+    assert_eq!(plant.trouble(), None, "{sides} sides");
+    let height_m = plant.bodies()[0].position_W_m.z;
+    assert!((height_m - 0.1).abs() < 1e-5, "{sides} sides: {height_m} m");
+    taken
+}
+
+/// As the vehicle on the ground, once in a search. Contacts of many corners do not fill the buffers.
+#[test]
+fn a_face_of_many_corners_takes_no_more_memory_than_one_of_four() {
+    let counts = [4, 16, 32, 300].map(|sides| (sides, taken_by_prism(sides)));
+    println!("in 1000 ticks: {counts:?}");
+    for (sides, count) in counts {
+        assert!(count <= 1_300, "{sides} sides: {count} times in 1000 ticks, expected 1300 at most");
     }
 }
 

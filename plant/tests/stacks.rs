@@ -251,68 +251,6 @@ fn stacks_that_bounce_are_solved_and_make_no_energy() {
     assert!(all.is_ok() || ended.is_empty(), "{ended:?}");
 }
 
-/// Parry finds contacts of four corners of a face. A prism with more sides stood on these alone, and sank by 11 cm.
-#[test]
-fn prisms_of_many_sides_that_rock_stay_above_the_ground() {
-    for sides in [3_u32, 6, 8, 16] {
-        let corners: Vec<Vector3<f64>> = [-0.1, 0.1]
-            .into_iter()
-            .flat_map(|z| {
-                (0..sides).map(move |side| {
-                    let (sin, cos) = libm::sincos(f64::from(side) * std::f64::consts::TAU / f64::from(sides));
-                    Vector3::new(0.12 * cos, 0.12 * sin, z)
-                })
-            })
-            .collect();
-        let mut stack = prism(sides, &corners);
-        let may_gain_J = 1e-4;
-        let (mut least_J, mut lowest_m) = (stack.energy_J(), 0.0_f64);
-        for tick in 0..1_000 {
-            stack.tick();
-            let energy_J = stack.energy_J();
-            assert!(energy_J < least_J + may_gain_J, "{sides} sides, tick {tick}: {least_J} to {energy_J} J");
-            least_J = least_J.min(energy_J);
-            let body = &stack.plant.bodies()[0];
-            let heights_m = corners.iter().map(|corner| (body.position_W_m + body.attitude_WB * corner).z);
-            lowest_m = heights_m.fold(lowest_m, f64::min);
-        }
-        assert!(lowest_m > -2e-6, "{sides} sides: {lowest_m} m");
-        assert_eq!(stack.plant.trouble(), None, "{sides} sides");
-    }
-}
-
-/// An upright prism of 1 kg on the ground that starts to rock. The first half of its corners is its lower face.
-fn prism(sides: u32, corners: &[Vector3<f64>]) -> Stack {
-    let lines = corners.iter().map(|corner| format!("v {:?} {:?} {:?}\n", corner.x, corner.y, corner.z));
-    let walls = (1..=sides).map(|one| {
-        let two = one % sides + 1;
-        format!("f {one} {two} {} {}\n", two + sides, one + sides)
-    });
-    let face = |numbers: Vec<u32>| {
-        let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
-        format!("f {}\n", numbers.join(" "))
-    };
-    let ends = [face((1..=sides).rev().collect()), face((sides + 1..=2 * sides).collect())];
-    let mesh: String = lines.chain(walls).chain(ends).collect();
-    let keys = [
-        ("mass", "1", "kg"),
-        ("position", "[0, 0, 0.1]", "m"),
-        ("scale", "1", "m"),
-        ("angular_velocity", "[2, 1, 0]", "rad/s"),
-    ];
-    let keys: String =
-        keys.iter().map(|(key, value, unit)| format!("{key} = {}\n", given(value, unit))).collect();
-    let surface = format!("friction = {}\nrestitution = {}\n", given("0.6", "1"), given("0", "1"));
-    let named = "[[meshes]]\nname = \"prism\"\nfile = \"prism.obj\"\nsolid = \"convex\"\n";
-    let text = format!("name = \"test\"\n{surface}{named}{keys}");
-    let read = |_: &std::path::Path| Ok(mesh.clone().into_bytes());
-    let scene =
-        Scene::parse_with(&text, "test.toml", &read).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let start = RigidBody::level_at(Vector3::new(100.0, 0.0, 50.0));
-    let plant = common::rapier(NewtonEuler::new(hummingbird(), 2), &scene, &start, 1e9);
-    Stack { scene, plant }
-}
-
 #[test]
 fn the_vehicle_that_falls_on_a_light_box_is_not_thrown_away() {
     for mass_kg in [5e-3, 5e-4] {

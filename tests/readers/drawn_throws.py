@@ -11,7 +11,7 @@ import random
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 G_M_S2 = 9.81
-# Sides of a prism. Faces with more than four corners stand on four of them: docs/world.md.
+# Sides of a prism. Faces with more than four corners have tests of their own: plant/tests/prisms.rs.
 SIDES = 3
 # Lengths of stacks are multiples of this, so that bodies touch exactly, without rounding.
 GRAIN_M = 1 / 1024

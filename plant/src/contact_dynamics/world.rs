@@ -32,6 +32,9 @@ const FIRST_NEIGHBOUR: u32 = 1000;
 /// Shapes that overlap by no more than this touch each other: tuned, no source.
 const OVERLAP_M: f64 = 1e-4;
 
+/// Overlap that is rounding. Tuned, no source.
+const ROUNDING_M: f64 = 1e-9;
+
 /// The vehicle and its surroundings.
 pub(super) struct World {
     /// The ground, then the still things.
@@ -268,7 +271,7 @@ impl World {
     pub(super) fn thing_around(&self, body: &RigidBody) -> Option<usize> {
         let pose = body::pose(body);
         let meets = |thing: &Collider, part: &Collider| {
-            overlap((part.shape(), &(pose * *part.position())), (thing.shape(), thing.position()))
+            overlap((part.shape(), &(pose * *part.position())), (thing.shape(), thing.position()), OVERLAP_M)
         };
         let mut things = self.things.iter().skip(1).map(|thing| &thing.collider);
         let around = things.find(|thing| self.hull.iter().any(|part| meets(thing, part)))?;
@@ -356,18 +359,18 @@ fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifo
     for manifold in manifolds {
         let is_deep = manifold.points.iter().any(|point| point.dist < -OVERLAP_M);
         let triangle: &dyn Shape = &mesh.triangle(manifold.subshape1);
-        if is_deep && !overlap((triangle, thing.1), (part.0.shape(), part.1)) {
+        if is_deep && !overlap((triangle, thing.1), (part.0.shape(), part.1), ROUNDING_M) {
             manifold.points.retain(|point| point.dist >= -OVERLAP_M);
         }
     }
 }
 
-/// True if two shapes overlap by more than rounding. Touching is no overlap.
-fn overlap((one, pose): (&dyn Shape, &Pose), (other, other_pose): (&dyn Shape, &Pose)) -> bool {
+/// True if two shapes overlap by more than `least_m`.
+fn overlap((one, pose): (&dyn Shape, &Pose), (other, other_pose): (&dyn Shape, &Pose), least_m: f64) -> bool {
     let met = intersection_test(pose, one, other_pose, other);
-    // Within the distance that is touching, so that only a search that fails finds nothing.
+    // Searched within a distance, so that only a search that fails finds nothing.
     let deepest = || contact(pose, one, other_pose, other, OVERLAP_M).ok().flatten();
-    met.is_ok_and(|found| found.intersecting) && deepest().is_none_or(|found| found.dist < -OVERLAP_M)
+    met.is_ok_and(|found| found.intersecting) && deepest().is_none_or(|found| found.dist < -least_m)
 }
 
 fn numbers(collider: &Collider) -> Vec<f64> {
