@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
-use common::parts::{Prism, given, keys};
+use common::parts::{Prism, body, given, keys};
 use common::{TICK_S, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
@@ -176,4 +176,31 @@ fn a_prism_that_overhangs_the_corner_of_a_mesh_stays_where_it_is() {
     assert!(lowest_m > -2e-6, "{lowest_m} m");
     let off_W_m = flight.plant.bodies()[0].position_W_m - Vector3::from(place_m);
     assert!(off_W_m.norm() < 1e-5, "{off_W_m:?}");
+}
+
+/// The first four corners of the plate are not below the box, which stood on one point alone.
+#[test]
+fn a_box_rocks_on_a_plate_of_many_sides_as_on_one_of_four() {
+    for sides in [4, 8, 32] {
+        let obj = Prism { sides, radius_m: 0.5, half_m: 0.1 }.obj();
+        let place = keys(&[("position", "[0, 0, 0.1]", "m"), ("scale", "1", "m")]);
+        let plate =
+            format!("[[meshes]]\nname = \"plate\"\nfile = \"plate.obj\"\nsolid = \"convex\"\n{place}");
+        let cube = [
+            ("centre", "[0.1, 0.05, 0.25]", "m"),
+            ("size", "[0.1, 0.1, 0.1]", "m"),
+            ("mass", "1", "kg"),
+            ("angular_velocity", "[0.5, 0.3, 0]", "rad/s"),
+        ];
+        let text = format!("name = \"test\"\n{}{plate}", body("boxes", "cube", &cube));
+        let scene = Scene::parse_with(&text, "test.toml", &|_| Ok(obj.clone().into_bytes())).unwrap();
+        let start = RigidBody::level_at(Vector3::new(100.0, 0.0, 50.0));
+        let mut plant = common::rapier(NewtonEuler::new(hummingbird(), 2), &scene, &start, 1e9);
+        (0..500).for_each(|_| plant.step(&[hummingbird().hover_command(); 4], TICK_S, &[]));
+        let found = plant.bodies()[0];
+        let off_m = (found.position_W_m.z - 0.25).abs();
+        let tilt_rad = (found.attitude_WB * Vector3::z()).xy().norm();
+        let spin_rad_s = found.angular_velocity_B_rad_s.norm();
+        assert!(off_m < 1e-6 && tilt_rad < 1e-6 && spin_rad_s < 1e-6, "{sides} sides: {found:?}");
+    }
 }

@@ -1,8 +1,8 @@
 //! Corners of convex meshes that parry leaves out.
 //!
 //! Parry finds contacts of the first four corners of a face. A face with more corners would stand on these alone, and its other
-//! corners would sink. This module adds the others, at most [`LARGEST`] for a face that touches, so that the buffers of a
-//! step suffice for any mesh.
+//! corners would sink. A box on a face with more would stand on one point. This module adds the corners of both, at most
+//! [`LARGEST`] for two that touch, so that the buffers of a step suffice for any mesh.
 
 use super::rim::gap;
 use super::sheet::Manifold;
@@ -66,7 +66,8 @@ impl Corner {
     }
 }
 
-/// Passes to `tell` the corners of large faces that are within `margin_m` and not among the points of `manifolds`.
+/// Passes to `tell` the corners of two solids, one of which has a large face, that are within `margin_m` and not among the points
+/// of `manifolds`.
 pub(super) fn missing(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),
@@ -74,7 +75,7 @@ pub(super) fn missing(
     manifolds: &[Manifold],
     mut tell: impl FnMut(Corner),
 ) {
-    if corners(thing.0).is_empty() && corners(part.0).is_empty() {
+    if !has_large_face(thing.0) && !has_large_face(part.0) {
         return;
     }
     if let Some(mesh) = thing.0.shape().as_trimesh() {
@@ -183,19 +184,29 @@ fn near(
 
 /// The placed corners of a solid, without those that are too far from the lowest one along `normal` to touch.
 fn lowest((solid, pose): (&Collider, &Pose), normal: Vector, margin_m: f64) -> impl Iterator<Item = Vector> {
-    let placed = corners(solid).iter().map(move |corner| pose.transform_point(*corner));
+    let placed = corners(solid).map(move |corner| pose.transform_point(corner));
     let least_m = placed.clone().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
     placed.filter(move |corner| corner.dot(normal) < least_m + 2.0 * margin_m)
 }
 
-/// The corners of a convex mesh with large faces; none of other shapes.
-fn corners(solid: &Collider) -> &[Vector] {
-    let solid = solid.shape().as_convex_polyhedron().filter(|solid| has_large_face(solid));
-    solid.map_or(&[][..], ConvexPolyhedron::points)
+/// The corners of a convex mesh or a box; none of other shapes.
+fn corners(solid: &Collider) -> impl Iterator<Item = Vector> + Clone {
+    let shape = solid.shape();
+    let mesh = shape.as_convex_polyhedron().map_or(&[][..], ConvexPolyhedron::points);
+    let cuboid = shape.as_cuboid().map(|cuboid| {
+        let corner = |number: usize| {
+            let sign = |bit: usize| if number & bit == 0 { -1.0 } else { 1.0 };
+            cuboid.half_extents * Vector::new(sign(1), sign(2), sign(4))
+        };
+        std::array::from_fn::<Vector, 8, _>(corner)
+    });
+    mesh.iter().copied().chain(cuboid.into_iter().flatten())
 }
 
-fn has_large_face(solid: &ConvexPolyhedron) -> bool {
-    solid.faces().iter().any(|face| face.num_vertices_or_edges > CORNERS)
+/// True if parry leaves out corners of a face of this solid.
+fn has_large_face(solid: &Collider) -> bool {
+    let faces = solid.shape().as_convex_polyhedron().map_or(&[][..], ConvexPolyhedron::faces);
+    faces.iter().any(|face| face.num_vertices_or_edges > CORNERS)
 }
 
 /// Corners of one face: all of them, if they are no more than [`LARGEST`]; otherwise those that span the face, and the lowest.
@@ -330,8 +341,8 @@ mod tests {
             let found = found((&ground, &below), (&prism, &place));
             let count = found.len();
             assert!((16..=LARGEST).contains(&count), "{sides} sides: {count}");
-            let corners = || corners(&prism).iter().map(|corner| place.transform_point(*corner));
-            let lowest_m = corners().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
+            let heights_m = corners(&prism).map(|corner| place.transform_point(corner).z);
+            let lowest_m = heights_m.fold(f64::INFINITY, f64::min);
             let least_m = found.iter().map(|corner| corner.gap_m).fold(f64::INFINITY, f64::min);
             assert!((least_m - lowest_m).abs() < 1e-9, "{sides} sides: {least_m} m, not {lowest_m} m");
             for number in 0..64 {
@@ -341,6 +352,15 @@ mod tests {
                 assert!(reach_m > 0.94 * RADIUS_M, "{sides} sides: {reach_m} m in direction {number}");
             }
         }
+    }
+
+    #[test]
+    fn a_box_stands_on_its_corners_on_a_face_of_many() {
+        let (plate, cube) = (prism(32), ColliderBuilder::cuboid(0.02, 0.03, 0.01).build());
+        let above = Pose::from_translation(Vector::new(0.01, 0.02, 0.111));
+        let found = found((&plate, &Pose::IDENTITY), (&cube, &above));
+        assert_eq!(found.len(), 4);
+        assert!(found.iter().all(|corner| (corner.gap_m - 1e-3).abs() < 1e-6), "{found:?}");
     }
 
     #[test]
