@@ -135,7 +135,7 @@ fn a_face_of_hundreds_of_corners_falls_and_stands_as_one_of_four() {
         let lowest_m = flight.lowest_in_m(500, 1e-4);
         assert!(lowest_m > -2e-6, "{sides} sides: {lowest_m} m");
         let (height_m, fastest) = (flight.lowest_m(), flight.fastest_m_s());
-        assert!(height_m.abs() < 2e-6 && fastest < 1e-6, "{sides} sides: {height_m} m, {fastest} m/s");
+        assert!(height_m.abs() < 2e-6 && fastest < 1e-4, "{sides} sides: {height_m} m, {fastest} m/s");
     }
 }
 
@@ -151,7 +151,7 @@ fn equal_prisms_stand_on_each_other() {
         let off_m = [0.1, 0.3].map(|z| Vector3::z() * z);
         let off_m = [0, 1].map(|at| (places_W_m[at] - off_m[at]).norm());
         assert!(off_m[0].max(off_m[1]) < 1e-5, "{sides} sides: {off_m:?} m");
-        assert!(flight.fastest_m_s() < 1e-5, "{sides} sides: {} m/s", flight.fastest_m_s());
+        assert!(flight.fastest_m_s() < 1e-4, "{sides} sides: {} m/s", flight.fastest_m_s());
     }
 }
 
@@ -201,6 +201,6 @@ fn a_box_rocks_on_a_plate_of_many_sides_as_on_one_of_four() {
         let off_m = (found.position_W_m.z - 0.25).abs();
         let tilt_rad = (found.attitude_WB * Vector3::z()).xy().norm();
         let spin_rad_s = found.angular_velocity_B_rad_s.norm();
-        assert!(off_m < 1e-6 && tilt_rad < 1e-6 && spin_rad_s < 1e-6, "{sides} sides: {found:?}");
+        assert!(off_m < 1e-6 && tilt_rad < 1e-6 && spin_rad_s < 1e-5, "{sides} sides: {found:?}");
     }
 }
