@@ -35,9 +35,11 @@ impl Candidate {
             || self.free.iter().all(|at| others.iter().any(|other| other.free.contains(at)))
     }
 
-    /// The parameters `free` without its own.
-    pub fn beside(&self, free: &[usize]) -> Vec<usize> {
-        free.iter().copied().filter(|at| !self.free.contains(at)).collect()
+    /// The parameters of those `accepted` that stay beside it (see [`with`]), without its own.
+    pub fn beside(&self, accepted: &[Candidate]) -> Vec<usize> {
+        let stay = accepted.iter().filter(|other| !other.is_in(std::slice::from_ref(self)));
+        let free = stay.flat_map(|other| other.free.iter().copied());
+        free.filter(|at| !self.free.contains(at)).collect()
     }
 }
 
@@ -200,10 +202,16 @@ mod tests {
         let accepted = [drag.clone(), wind.clone()];
         assert_eq!(with(&accepted, &winds), [drag.clone(), winds.clone()]);
         assert!(wind.is_in(&[drag.clone(), winds.clone()]) && !winds.is_in(&accepted));
-        assert_eq!(winds.beside(&free_parameters(&accepted)), [1]);
+        assert_eq!(winds.beside(&accepted), [1]);
         assert_eq!(with(&accepted, &of(&[6])), [drag.clone(), wind, of(&[6])]);
         let common = Candidate { kind: &WIND, free: vec![2, 3, 7] };
-        assert_eq!(with(&[drag.clone(), common.clone()], &winds), [drag, winds.clone()]);
+        let accepted = [drag.clone(), common.clone()];
+        assert_eq!(with(&accepted, &winds), [drag, winds.clone()]);
+        assert_eq!(
+            winds.beside(&accepted),
+            [1],
+            "a vertical wind of all flights is not fitted beside level ones"
+        );
         assert!(common.is_in(&[winds]));
     }
 

@@ -194,7 +194,7 @@ pub fn fitted(
     accepted: &[Candidate],
     candidate: &Candidate,
 ) -> FitResult {
-    let all = [candidate.beside(&free_parameters(accepted)), candidate.free.clone()].concat();
+    let all = [candidate.beside(accepted), candidate.free.clone()].concat();
     problem.fitted(&start(problem, base, candidate).0, &all)
 }
 
@@ -206,7 +206,7 @@ pub fn fitted_from(
     candidate: &Candidate,
     promised: &[f64],
 ) -> FitResult {
-    let all = [candidate.beside(&free_parameters(accepted)), candidate.free.clone()].concat();
+    let all = [candidate.beside(accepted), candidate.free.clone()].concat();
     problem.fitted(&start_from(problem, base, candidate, promised), &all)
 }
 

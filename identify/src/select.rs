@@ -365,7 +365,7 @@ fn fitted_as_promised(
     level: f64,
 ) -> Judged {
     let candidate = &promise.candidate;
-    let others = candidate.beside(&screen.accepted);
+    let others = candidate.beside(accepted);
     let near = if candidate.kind.guesses.is_empty() {
         let all = [others.as_slice(), &candidate.free].concat();
         problem.fitted_near(&screen.equations.of(&all), &base.values)
@@ -389,7 +389,7 @@ fn promised_from_guess(
     accepted: &[Candidate],
     candidate: &Candidate,
 ) -> FitResult {
-    let accepted = candidate.beside(&free_parameters(accepted));
+    let accepted = candidate.beside(accepted);
     let all = [accepted.clone(), candidate.free.clone()].concat();
     let blocks = |flights, values: &[f64]| {
         problem.blocks_near(flights, (&base.values, &accepted), values, &candidate.free)

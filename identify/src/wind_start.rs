@@ -12,7 +12,7 @@ use crate::prepared::{Equation, Prepared};
 use crate::rows::column;
 use rayon::prelude::*;
 
-/// A flight has a wind of its own from so many blocks of time on: its three numbers are known by these alone; tuned, no source.
+/// A flight has a wind of its own from so many blocks of time on: its two numbers are known by these alone; tuned, no source.
 const LEAST_BLOCKS: usize = 10;
 /// Steps to the winds that mean forces ask for: the drag changes with the wind.
 const START_STEPS: usize = 3;
