@@ -125,6 +125,7 @@ fn a_profile_of_a_run_that_went_back_begins_there() {
     let summary = launch.end().with_code(1).json();
     let (ticks, profile) = (summary["ticks"].as_u64().unwrap(), &summary["profile"]);
     assert!(ticks >= 50, "{summary}");
+    assert_eq!(profile["ticks"], ticks, "{profile}");
     assert_eq!((&profile["first_tick"], &summary["rewinds"][0]["to_tick"]), (&200.into(), &200.into()));
     let plant = profile["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "plant").unwrap();
     assert_eq!(plant["compute"]["count"], ticks, "{plant}");

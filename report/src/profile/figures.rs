@@ -24,6 +24,7 @@ use std::path::Path;
 pub struct Profile {
     /// The first tick that was profiled: that of the checkpoint from which the run went on, also after a rewind.
     pub(super) first_tick: u32,
+    /// Ticks that every node completed, from that one on.
     ticks: u32,
     /// Computations whose times were noted, over all nodes.
     noted: usize,
@@ -46,7 +47,7 @@ impl Profile {
         let measured = recording.and_then(|path| Measured::read(flight, path).ok());
         Self {
             first_tick: flight.plan.first_tick,
-            ticks: flight.ticks,
+            ticks: flight.ticks.saturating_sub(flight.plan.first_tick),
             noted: flight.noted(),
             left_out: flight.left_out(),
             nodes,

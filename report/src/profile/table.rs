@@ -27,7 +27,7 @@ impl Display for Profile {
         }
         self.write_pacing(f)?;
         if self.first_tick > 0 {
-            writeln!(f, "profiled from tick {} on, from whose checkpoint the run goes on", self.first_tick)?;
+            writeln!(f, "profiled from tick {} on: the run went on from its checkpoint", self.first_tick)?;
         }
         if self.left_out > 0 {
             writeln!(f, "not profiled: {} computations beyond the first of each node", self.left_out)?;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-/// Ticks from the start of the run that a trace holds at most.
+/// Number of the first profiled ticks that a trace holds at most.
 const FIRST_TICKS: u32 = 2000;
 /// Slowest ticks that it holds, each with the ticks before and after it.
 const SLOWEST_TICKS: usize = 100;
