@@ -130,8 +130,13 @@ impl StepwiseSearch {
         candidates: &[Candidate],
         progress: &mut dyn FnMut(&str),
     ) {
-        let Some((mut accepted, fitted)) = several_winds(problem, &self.base, candidates) else { return };
-        progress("several winds: all by which they act, together");
+        let noises = problem.noises.clone();
+        let Some((mut accepted, fitted)) = several_winds(problem, &self.base, candidates) else {
+            // The rounds begin as without this trial.
+            problem.noises = noises;
+            return;
+        };
+        progress("several winds: drags, lifts and thrust together");
         let fitted = without_idle(problem, fitted, &mut accepted, &[]);
         let level = FALSE_RATE / accepted.len() as f64;
         for (at, candidate) in accepted.iter().enumerate() {
