@@ -149,9 +149,11 @@ pub struct Parameter {
     pub entry: &'static str,
     /// Value in examples, as TOML; empty where there is none.
     pub example: &'static str,
-    /// Kind of the file whose path it is; `None` where it is no path, or nothing need be known of the file.
+    /// Kind of the file whose path it is. `None` for all other values, and for files without a declared kind. The launcher does not look
+    /// into tables.
     pub file: Option<FileKind>,
-    /// True if it counts at the start alone, since the state begins with it. A run that goes on from a checkpoint refuses other values.
+    /// True if it counts only at the start: the state begins with it. A run from a checkpoint refuses other values. The launcher does not
+    /// look into tables.
     pub is_initial: bool,
 }
 

@@ -84,7 +84,7 @@ impl Registration {
         self.parameter(name).is_some()
     }
 
-    /// True if its parameter called `name` counts at the start alone.
+    /// True if its parameter called `name` counts only at the start.
     #[must_use]
     pub fn is_initial(&self, name: &str) -> bool {
         self.parameter(name).is_some_and(|parameter| parameter.is_initial)
@@ -94,7 +94,7 @@ impl Registration {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// The kind of the file that its parameter called `name` names, as far as it declares one.
+    /// Kind of the file that its parameter called `name` names; `None` if the component declares none.
     #[must_use]
     pub fn file(&self, name: &str) -> Option<FileKind> {
         self.parameter(name)?.file

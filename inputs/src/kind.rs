@@ -3,7 +3,7 @@
 use crate::files::InputFiles;
 use std::path::{Path, PathBuf};
 
-/// A kind of file that a parameter names. Whoever prepares a run learns from it how to treat such a file.
+/// Kind of the file that a parameter names. A launcher treats the file by its kind.
 ///
 /// ```
 /// use inputs::{FileKind, FileRole, InputFiles};
@@ -22,27 +22,27 @@ use std::path::{Path, PathBuf};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FileKind {
-    /// Its role in a run.
+    /// Role in a run.
     pub role: FileRole,
-    /// The files that the file at a path names itself; its faults are reported where it is read.
+    /// Function that lists the files which the file at a path names. It skips faults: the component that reads the file reports them.
     pub others: fn(&InputFiles, &Path) -> Vec<PathBuf>,
-    /// True if warnings about such a file may explain why it is refused, so that both are shown.
+    /// True if a refused file is reported with the warnings about it, which may explain the refusal.
     pub has_explaining_warnings: bool,
 }
 
 /// Role of a file in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileRole {
-    /// Model of what moves, or of its surroundings, in TOML. A component of another kind that takes over reads the same file.
+    /// Model of a vehicle or of its surroundings, in TOML. A component of another kind that takes over reads the same file.
     Model,
     /// Settings of the component, in TOML. A table in the parameters replaces values of the file.
     Settings,
-    /// A program, which reads files beside it.
+    /// Program, which reads files beside it.
     Program,
 }
 
 impl FileKind {
-    /// Files that name no other file.
+    /// Kind of files that name no other files.
     #[must_use]
     pub const fn of(role: FileRole) -> Self {
         Self { role, others: |_, _| Vec::new(), has_explaining_warnings: false }

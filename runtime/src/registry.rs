@@ -102,8 +102,8 @@ impl Registry {
         self.iter().find(|component| component.name == name)
     }
 
-    /// The kind of the file whose path a process states at `key`, as its `component` declares it; of a command, and of a component that does
-    /// not declare it, as another component does.
+    /// Kind of the file whose path a process states at `key`, as its `component` declares it. If the process is a command, or its component
+    /// does not declare the kind, the first component that declares it counts.
     ///
     /// ```
     /// use bus::Registration;
@@ -117,7 +117,7 @@ impl Registry {
         declared.or_else(|| self.iter().find_map(|component| component.file(key)))
     }
 
-    /// The role of the file whose path a process states at `key`, as the first component that has such a parameter declares it.
+    /// Role of the file whose path a process states at `key`, as the first component that declares it has it.
     #[must_use]
     pub fn file_role(&self, key: &str) -> Option<FileRole> {
         self.file(None, key).map(|kind| kind.role)

@@ -122,6 +122,10 @@ pub fn derive_output_ports(input: TokenStream) -> TokenStream {
 /// - `table = TYPE`: the type that declares and checks the keys of the table; with `entry = "NAME"` those of each table in it, or in the list
 ///   (`"N"`).
 /// - `example = "…"`: a value for examples, as TOML.
+/// - `file = EXPRESSION`: the kind of the file whose path it is, a `bus::FileKind`. The launcher reads it of a component's own parameters, not
+///   within tables.
+/// - `initial`: the parameter counts only at the start. A run from a checkpoint refuses other values. As `file`, it has no effect within
+///   tables.
 /// - `rename = "…"`: its name in the manifest.
 ///
 /// `#[parameters(default)]` on the struct derives `Default` too.

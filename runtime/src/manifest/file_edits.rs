@@ -1,5 +1,5 @@
-//! Values of a process's files that `--set` replaces, such as `--set process.plant.vehicle.body.mass=0.5`: of those files that
-//! components declare as models or settings.
+//! Values in files of processes that `--set` replaces, such as `--set process.plant.vehicle.body.mass=0.5`. Components declare
+//! these files as models or settings.
 //!
 //! The file on the disk is not changed. The process reads an edited copy under a path of its own beside the original.
 //! A controller of the same vehicle file still reads the original.
