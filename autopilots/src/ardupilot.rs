@@ -214,7 +214,7 @@ fn program(context: &NodeContext<'_>, path: &Path) -> Result<Vec<u8>, ParameterE
     Ok(program)
 }
 
-/// Refuses a period that is no step of the firmware's clock.
+/// Refuses a period that the firmware's clock cannot take as a step.
 fn check_period(period_s: f64) -> Result<(), ParameterError> {
     let period_us = period_s * 1e6;
     let is_short = refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {

@@ -6,7 +6,7 @@ use diagnostics::ParameterError;
 const NAME_LENGTH_MAX: usize = 16;
 /// Characters between a name and its value.
 const SEPARATORS: [char; 5] = [' ', ',', '=', '\t', '\r'];
-/// Faulty lines that are told: a file of another format has a fault in each line.
+/// Number of faulty lines that are reported at most: a file of another format has a fault in each line.
 const TOLD_MAX: usize = 20;
 
 /// Names and values of `text`, the parameter `configuration`, in its order.

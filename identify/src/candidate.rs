@@ -28,7 +28,7 @@ impl Candidate {
         self.kind.steady_state && self.kind.turns_steadily
     }
 
-    /// True if each of its parameters is one of `others`. One wind for all is in winds of flights, although these are level.
+    /// True if each of its parameters is one of `others`. The wind of all flights also counts as part of the winds of flights, which are level.
     pub fn is_in(&self, others: &[Candidate]) -> bool {
         let are_winds = |other: &Candidate| *self.kind == WIND && *other.kind == FLIGHT_WIND;
         others.iter().any(are_winds)

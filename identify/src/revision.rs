@@ -44,7 +44,7 @@ pub struct Withdrawn {
 }
 
 impl Withdrawn {
-    /// An effect that was withdrawn for this reason. Neither did it reach a bound, nor was it replaced.
+    /// An effect that was withdrawn for this reason, without a bound that it reached and without a replacement.
     pub fn because(effect: &'static str, reason: String) -> Self {
         Self { effect, reason, at_bound: false, replaced_by: None }
     }

@@ -20,7 +20,7 @@
 //! If a round accepts nothing although all candidates together would reduce the cost much, pairs are tried that
 //! gain only together. They face the same tests; the chance of a false acceptance in that search is
 //! [`FALSE_RATE`] once more. So are pairs of a drag and one wind for each flight (`flight_wind`), whatever is left. The rounds end when nothing changes
-//! any more. Where flights show several winds, the search begins with these and all by which they act (`wind_search`).
+//! any more. If flights show several winds, the search begins with these and all effects by which they act (`wind_search`).
 
 use crate::candidate::{Candidate, free_parameters, with};
 use crate::fit::{Equations, Problem, unbounded};
@@ -123,7 +123,7 @@ struct StepwiseSearch {
 }
 
 impl StepwiseSearch {
-    /// Begins with the winds of the flights and all by which they act, if the flights show several winds.
+    /// Begins with the winds of the flights and all effects by which they act, if the flights show several winds.
     fn begin_in_several_winds(
         &mut self,
         problem: &mut Problem,

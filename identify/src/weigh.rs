@@ -46,8 +46,8 @@ fn noise_of(flights: &[Left], is_own: bool, is_white: bool) -> (ComponentNoise, 
 }
 
 /// Sets the spread of the trims of each component. Torques about x and y come from the same propellers and batteries: they
-/// share theirs, since two flights often agree about one axis by chance. A force across the thrust that is greater than a crooked sensor or a skewed
-/// battery makes is no trim: it is a wind, or another effect that has to explain it.
+/// share theirs, since two flights often agree about one axis by chance. A tilted sensor or a shifted battery causes no greater force across the thrust
+/// than [`MOST_TRIM_M_S2`]: a wind or another effect has to explain the rest.
 fn set_spreads(noises: &mut Noises, means: &BTreeMap<Component, Means>) {
     let tilting = [0, 1].map(|axis| (Equation::AngularAcceleration.name(), axis));
     let across = [Equation::SpecificForce.name(), Equation::Acceleration.name()];
@@ -59,7 +59,7 @@ fn set_spreads(noises: &mut Noises, means: &BTreeMap<Component, Means>) {
     }
 }
 
-/// Spread of the trims along x and y at most: gravity along an axis of a sensor that is 3° askew, as its bound is.
+/// Greatest spread of the trims along x and y: gravity along an axis of a sensor that is tilted by its bound, 0.0524 rad (3°).
 pub const MOST_TRIM_M_S2: f64 = 0.514;
 
 /// A component without any noise would count infinitely: no sensor is better than this part of its own signal.

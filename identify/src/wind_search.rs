@@ -15,10 +15,12 @@ use crate::weigh::MOST_TRIM_M_S2;
 use crate::wind_start::start_beside;
 use plant::effects::Action;
 
-/// Winds of flights have to take at least this part of the squared error that one wind for all leaves. Most of that is noise within each flight; tuned, no source.
+/// Least part of the squared error with one wind for all flights that several winds have to explain. Most of that error is noise within each flight; tuned,
+/// no source.
 const LEAST_GAIN: f64 = 0.02;
 
-/// The winds of the flights beside the effects by which they act, and the fit of all; `None` where one wind explains the flights nearly as well.
+/// The winds of the flights beside the effects by which they act, and the fit of all. `None` if one wind explains the flights nearly as well, or if
+/// winds of flights are not among the `candidates`. The noise of `problem` is then that of the trial.
 pub fn several_winds(
     problem: &mut Problem,
     declared: &FitResult,

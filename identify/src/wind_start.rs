@@ -69,8 +69,8 @@ pub fn start(problem: &Problem, base: &FitResult) -> (Vec<f64>, f64) {
     (values, cost.min(least))
 }
 
-/// The values of `base` with each of these drags at a plausible value, and with the winds that the forces of each flight then ask for; `None` where
-/// nothing feels the air.
+/// The values of `base` with plausible `drags`, and with the winds that the forces of each flight ask for beside these drags. `None` if nothing feels
+/// the air.
 pub fn start_beside(problem: &Problem, base: &FitResult, drags: &[Candidate]) -> Option<Vec<f64>> {
     let mut values = base.values.clone();
     let of_drags = drags.iter().filter(|candidate| is_drag(candidate.kind));
