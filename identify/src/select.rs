@@ -139,10 +139,16 @@ impl StepwiseSearch {
         progress("several winds: drags, lifts and thrust together");
         let fitted = without_idle(problem, fitted, &mut accepted, &[]);
         let level = FALSE_RATE / accepted.len() as f64;
+        let open: Vec<&Candidate> =
+            candidates.iter().filter(|candidate| !candidate.is_in(&accepted)).collect();
         for (at, candidate) in accepted.iter().enumerate() {
+            let mut others = accepted.clone();
+            others.remove(at);
             let without = without(problem, &fitted, &accepted, at);
-            let judged = judged(problem, &without, candidate, fitted.clone(), level);
-            self.rounds.push(Round { judged: vec![judged], taken: Some(0) });
+            let mut judged = vec![judged(problem, &without, candidate, fitted.clone(), level)];
+            // Rivals of the effect are chosen among the candidates of its round.
+            judged.extend(promised_beside(problem, &without, &others, &open, level));
+            self.rounds.push(Round { judged, taken: Some(0) });
         }
         (self.accepted, self.base) = (accepted, fitted);
     }
@@ -469,6 +475,25 @@ fn idle(
     })
 }
 
+/// The `open` candidates beside `accepted` as the linearised equations promise them, without those that start at a guess.
+fn promised_beside(
+    problem: &Problem,
+    base: &FitResult,
+    accepted: &[Candidate],
+    open: &[&Candidate],
+    level: f64,
+) -> Vec<Judged> {
+    let linear: Vec<&Candidate> =
+        open.iter().copied().filter(|candidate| candidate.kind.guesses.is_empty()).collect();
+    let screen = Screen::of(problem, base, accepted, &linear);
+    let judge = |candidate: &&Candidate| {
+        let promised = screen.promised(problem, base, candidate);
+        let judged = judged(problem, base, candidate, promised, level);
+        Judged { way: Way::Promise, is_accepted: false, ..judged }
+    };
+    linear.par_iter().map(judge).collect()
+}
+
 /// Linearised equations from which the fit of each candidate is predicted.
 struct Screen {
     equations: Equations,
@@ -563,6 +588,23 @@ mod tests {
         let selection = search.finished(&mut problem, &candidates, &mut |_| ());
         let mass = selection.flown().values[mass.free[0]];
         Found { selection, mass, is_allowed: !allowed.is_empty() }
+    }
+
+    #[test]
+    fn candidates_beside_those_that_are_taken_together_are_promises() {
+        let vehicle = with_light_rotors();
+        let set = simulated(&vehicle, &[effect("mass-error", &[("error", 0.2)])]);
+        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let all = ["mass-error", "thrust-scale"].map(|name| candidate(&problem, name));
+        let declared = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        problem.weigh(&declared, &all);
+        let declared = problem.fitted(&declared.values, &[]);
+        let open: Vec<&Candidate> = all.iter().collect();
+        let found = promised_beside(&problem, &declared, &[], &open, FALSE_RATE);
+        let candidates: Vec<&Candidate> = found.iter().map(|judged| &judged.candidate).collect();
+        assert_eq!(candidates, open);
+        let is_promise = |judged: &Judged| judged.way == Way::Promise && !judged.is_accepted;
+        assert!(found.iter().all(|judged| is_promise(judged) && judged.gain > 0.0), "{found:?}");
     }
 
     /// The end where thrust and the inertia about x and y have these errors.
