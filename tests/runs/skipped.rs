@@ -73,8 +73,8 @@ pub fn quick_or<T>(quick: T, whole: T, what: &str) -> T {
     quick
 }
 
-/// True if the running test leaves the case that follows to `scripts/dev thorough`, which is reported. `why` says which quick
-/// test flies one of its kind.
+/// True if the running test leaves the case that follows to `scripts/dev thorough`, which is reported. `why` names the quick
+/// test that flies one of its kind, or says why there is none.
 #[allow(dead_code, reason = "few crates have heavy tests")]
 #[must_use]
 pub fn is_left(why: &str) -> bool {
