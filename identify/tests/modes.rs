@@ -157,9 +157,6 @@ fn repeated_samples_left_out_do_not_matter() {
 #[test]
 fn large_times_do_not_matter() {
     const SINCE_1970_S: f64 = 1.7e9;
-    if skipped::is_left("`repeated_samples_left_out_do_not_matter` has uneven times") {
-        return;
-    }
     let mut case = heavy_with_drag(23);
     case.plan.sensors.has_rotor_speeds = true;
     let later = changed(&case, |flight| {

@@ -1,6 +1,5 @@
 //! One wind for each flight: named where the flights have several winds, and only there.
 use crate::simulated;
-use crate::skipped::is_left;
 use flights::{Flight, FlightSet, Role};
 use identify::report::Report;
 use identify::run::identify;
@@ -58,9 +57,6 @@ fn several_winds_are_named_beside_the_drags_by_which_they_act() {
 
 #[test]
 fn one_wind_of_all_flights_is_one() {
-    if is_left("`several_winds_are_named_beside_the_drags_by_which_they_act` has winds") {
-        return;
-    }
     let found = report("hummingbird-drag.toml", 4_410, [(); 4].map(|()| vec![wind([4.0, -2.0])]));
     assert!(found.verdict.contains(&"wind") && !found.verdict.contains(&"flight-wind"), "{found}");
     assert!(found.winds.is_empty(), "{found}");

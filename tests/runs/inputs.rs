@@ -140,9 +140,6 @@ fn replaced_after_an_edit(place: &Place, tables: &str, replace: impl FnOnce(&mut
 
 #[test]
 fn a_restart_flies_the_files_of_the_run() {
-    if is_left("`a_live_swap_flies_the_files_of_the_run_and_reads_a_new_one_once` starts a process late") {
-        return;
-    }
     let place = Place::new();
     let recording = replaced_after_an_edit(&place, "on_exit = \"restart\"\n", |launch| {
         kill_process(place.process_of("controller"), Signal::KILL).unwrap();
