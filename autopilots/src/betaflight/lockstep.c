@@ -12,6 +12,7 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <pthread.h>
+#include <semaphore.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -58,11 +59,14 @@ struct answer {
     struct motors_packet motors;
 };
 
-/* A socket whose packets come from the simulation, and the thread that takes them. */
+/* A socket whose packets come from the simulation, and the thread that takes them. Its semaphores wake one thread each: a condition
+ * variable of all the threads woke each of them for each packet, which doubled the time of a tick. */
 struct link {
     int fd;
-    /* A packet waits; it was taken; it is being worked on. */
-    int is_waiting, is_taken;
+    /* A packet is there; the thread is done with it. */
+    sem_t sent, done;
+    /* Of that thread alone: it was told of a packet, and has read it. */
+    int is_told, is_taken;
 };
 
 static struct link states = { .fd = -1 }, sticks = { .fd = -1 };
@@ -71,8 +75,6 @@ static struct answer answer;
 static uint64_t now_ns, end_ns = UINT64_MAX;
 static int is_lockstep;
 static pthread_t main_thread;
-static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
 
 static int (*next_clock_gettime)(clockid_t, struct timespec *);
 static int (*next_nanosleep)(const struct timespec *, struct timespec *);
@@ -86,8 +88,16 @@ static void *next(const char *name)
     return dlsym(RTLD_NEXT, name);
 }
 
+static void begin_link(struct link *link)
+{
+    sem_init(&link->sent, 0, 0);
+    sem_init(&link->done, 0, 0);
+}
+
 __attribute__((constructor)) static void begin(void)
 {
+    begin_link(&states);
+    begin_link(&sticks);
     *(void **)&next_clock_gettime = next("clock_gettime");
     *(void **)&next_nanosleep = next("nanosleep");
     *(void **)&next_select = next("select");
@@ -119,26 +129,29 @@ static void transfer(int is_out, void *bytes, size_t size)
     }
 }
 
-/* Has the thread of `link` take its packet, and waits until it wants the next one. Under the mutex. */
+/* Waits for `semaphore`, whatever signals come. */
+static void await(sem_t *semaphore)
+{
+    while (sem_wait(semaphore) != 0)
+        ;
+}
+
+/* Has the thread of `link` take its packet, and waits until it wants the next one. */
 static void deliver(struct link *link)
 {
-    link->is_waiting = 1;
-    pthread_cond_broadcast(&changed);
-    while (link->is_waiting)
-        pthread_cond_wait(&changed, &mutex);
+    sem_post(&link->sent);
+    await(&link->done);
 }
 
 /* The main thread at the end of a tick. */
 static void finish_tick(void)
 {
-    pthread_mutex_lock(&mutex);
     transfer(1, &answer, sizeof answer);
     answer.is_fresh = 0;
     transfer(0, &tick, sizeof tick);
     if (tick.has_sticks)
         deliver(&sticks);
     deliver(&states);
-    pthread_mutex_unlock(&mutex);
     end_ns += tick.length_ns;
 }
 
@@ -207,15 +220,13 @@ int select(int count, fd_set *reads, fd_set *writes, fd_set *errors, struct time
         FD_ZERO(reads);
         return next_select(0, NULL, NULL, NULL, timeout);
     }
-    pthread_mutex_lock(&mutex);
     if (link->is_taken) {
-        link->is_taken = 0;
-        link->is_waiting = 0;
-        pthread_cond_broadcast(&changed);
+        link->is_taken = link->is_told = 0;
+        sem_post(&link->done);
     }
-    while (!link->is_waiting)
-        pthread_cond_wait(&changed, &mutex);
-    pthread_mutex_unlock(&mutex);
+    if (!link->is_told)
+        await(&link->sent);
+    link->is_told = 1;
     return 1;
 }
 
