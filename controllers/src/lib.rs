@@ -15,7 +15,7 @@
 //!   [`room`]: where the walls must be although other vehicles stand in the beams.
 //! - [`wall_stop_thesis`], [`wall_follow_thesis`]: the same as the thesis tells it; `free_flight`: its tilt by distance.
 //! - [`position_hold`]: holds the place between the pilot's commands, around a law about hover.
-//! - [`rc`]: raw channels of a remote control, by a script or a recording of a receiver.
+//! - [`rc`]: raw channels of a remote control, by a script, a recording of a receiver, or a `gamepad`; `pulses`: their ranges.
 //! - [`remote_control`]: turns set points into the sticks and switches of a remote control.
 //! - `flatness`: the attitude and rates that a trajectory needs; `motor_lag`: what the rotors make of a demand, foreseen,
 //!   and a demand that hurries them; `disturbance`: the acceleration that the model does not explain, observed;
@@ -55,6 +55,7 @@ mod flatness;
 mod flight_log;
 pub mod foresight;
 mod free_flight;
+mod gamepad;
 pub mod geometric;
 pub mod geometric_gains;
 pub mod law;
@@ -70,6 +71,7 @@ pub mod pid_gains;
 pub mod pilot;
 pub mod player;
 pub mod position_hold;
+mod pulses;
 pub mod rc;
 mod rehearsal;
 pub mod remote_control;

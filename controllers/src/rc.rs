@@ -1,17 +1,18 @@
-//! Raw channels of a remote control: a script of pulses, a recording of a receiver, or both on different channels.
+//! Raw channels of a remote control: a script of pulses, a recording of a receiver, and a gamepad, on different channels.
 //!
 //! A recording is a CSV file with the columns `time_s` and `ch1`, `ch2`, …, in µs. Between two rows the pulses of the earlier
 //! one hold, as those of a receiver do.
 
+use crate::gamepad::{Control, Gamepad};
+use crate::pulses::{LOW_US, PULSES_US, check_channel, check_pulse};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
-use diagnostics::parameter::{ParameterError, finite, not_negative, refuse, require};
+use diagnostics::parameter::{ParameterError, finite, not_negative, refuse};
 use inputs::InputFiles;
 use std::collections::BTreeSet;
 use std::fmt::Display;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use vehicles::table::{Dialect, Row, Table, TableError, names, shown};
 
@@ -19,11 +20,8 @@ use vehicles::table::{Dialect, Row, Table, TableError, names, shown};
 const THROTTLE: usize = 3;
 /// Pulses of sticks before the script moves them, µs; the throttle and all switches begin at the lower end.
 const MIDDLE_US: f64 = 1500.0;
-const LOW_US: f64 = 1000.0;
 /// Channels of the sticks: roll, pitch, throttle, yaw.
 const STICKS: usize = 4;
-/// Pulses that receivers send, µs.
-const PULSES_US: RangeInclusive<f64> = 800.0..=2200.0;
 
 /// Parameters of `rc`.
 #[derive(Debug, bus::Parameters)]
@@ -40,6 +38,11 @@ pub struct Parameters {
     /// Time in the recording at which tick 0 lies.
     #[parameter(default = 0.0)]
     from_s: f64,
+    /// Joystick device of Linux of a gamepad or a transmitter, such as `/dev/input/js0`.
+    gamepad: Option<PathBuf>,
+    /// List of the gamepad's controls, each of which moves a channel; `script` and `data` then have other channels only.
+    #[parameter(default = Vec::new(), table = Control, entry = "N")]
+    controls: Vec<Control>,
 }
 
 /// Move of a channel.
@@ -57,18 +60,6 @@ struct Move {
     /// Duration; 0 for a step.
     #[parameter(default = 0.0, check = not_negative)]
     over_s: f64,
-}
-
-/// Requires a channel of the message.
-fn check_channel(key: &str, channel: f64) -> Result<(), ParameterError> {
-    let is_there = (1.0..=RC_CHANNELS_MAX as f64).contains(&channel);
-    require(key, channel, is_there, format!("1 to {RC_CHANNELS_MAX}"))
-}
-
-/// Requires pulses that receivers send.
-pub(crate) fn check_pulse(key: &str, pulse_us: f64) -> Result<(), ParameterError> {
-    let (least, most) = (PULSES_US.start(), PULSES_US.end());
-    require(key, pulse_us, PULSES_US.contains(&pulse_us), format!("{least} to {most} µs"))
 }
 
 /// Outputs of `rc`.
@@ -97,12 +88,13 @@ pub struct Rc {
     script: Vec<Segment>,
     recording: Option<Recording>,
     from_s: f64,
+    gamepad: Option<Gamepad>,
 }
 
 impl Component for Rc {
     const INFO: Info = Info::new(
         "rc",
-        "raw channels of a remote control: a script of pulses from the manifest, or a recording of a receiver",
+        "raw channels of a remote control: a script of pulses from the manifest, a recording of a receiver, or a gamepad",
     );
     type Parameters = Parameters;
     type Inputs<'a> = ();
@@ -110,21 +102,24 @@ impl Component for Rc {
     type State = ();
 
     fn new(parameters: Parameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
-        let Parameters { channels, mut script, data, from_s } = parameters;
+        let Parameters { channels, mut script, data, from_s, gamepad, controls } = parameters;
         let start = refuse(!from_s.is_finite() || from_s != 0.0 && data.is_none(), "from_s", || {
             format!("`from_s` is {from_s} s, expected a time of the recording in `data`")
         });
         let recording = data.map(|path| Recording::load(&context.files, &path)).transpose();
-        let (recording, ()) = ParameterError::both(recording, start)?;
+        let gamepad = ParameterError::both(start, Gamepad::open(gamepad, controls));
+        let (recording, ((), gamepad)) = ParameterError::both(recording, gamepad)?;
         let recorded: BTreeSet<usize> =
             recording.iter().flat_map(|recording| recording.channels.iter().copied()).collect();
         let moved: BTreeSet<usize> = script.iter().map(|it| it.channel).collect();
-        let twice = moved.intersection(&recorded).map(|channel| {
-            let message =
-                format!("`script` moves channel {channel}, which `data` records; leave one of them out");
-            Err::<(), _>(ParameterError::conflict("script", message))
-        });
-        let highest = moved.union(&recorded).max().copied().unwrap_or(0).max(STICKS);
+        let by_hand = gamepad.as_ref().map(Gamepad::channels).unwrap_or_default();
+        let shared = [
+            refuse_shared("script", &moved, "`data` records", &recorded),
+            refuse_shared("controls", &by_hand, "`script` moves", &moved),
+            refuse_shared("controls", &by_hand, "`data` records", &recorded),
+        ];
+        let used = moved.iter().chain(&recorded).chain(&by_hand);
+        let highest = used.max().copied().unwrap_or(0).max(STICKS);
         let channels = channels.unwrap_or(highest);
         let count = refuse(!(highest..=RC_CHANNELS_MAX).contains(&channels), "channels", || {
             format!(
@@ -132,22 +127,10 @@ impl Component for Rc {
             )
         });
         let times = recording.as_ref().map_or(Ok(()), |recording| recording.check_times(from_s, context));
-        ParameterError::gather(twice.chain([count, times]))?;
+        ParameterError::gather(shared.into_iter().chain([count, times]))?;
         script.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-        if let Some(Move { channel, at_s, pulse_us, .. }) = never_acting(&script) {
-            let message = format!(
-                "`script` moves channel {channel} twice at {at_s} s: the move to {pulse_us} µs never acts; leave it out"
-            );
-            context.warn("script", message);
-        }
-        let end_s = context.duration_s();
-        for Move { channel, at_s, .. } in script.iter().filter(|it| it.at_s >= end_s) {
-            let message = format!(
-                "`script`: channel {channel} moves at {at_s} s, and the run ends at {end_s} s: it never acts"
-            );
-            context.warn_behind_end("script", message);
-        }
-        Ok(Self { channels, script: segments(&script), recording, from_s })
+        warn_of_moves(&script, context);
+        Ok(Self { channels, script: segments(&script), recording, from_s, gamepad })
     }
 
     fn initial(&self) {}
@@ -155,11 +138,44 @@ impl Component for Rc {
     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let time_s = context.time_s();
         let row = self.recording.as_ref().map(|recording| recording.row(self.from_s + time_s));
+        let by_hand = self.gamepad.as_ref().map(Gamepad::pulses_us).transpose()?;
         let pulse = |at: usize| {
+            let moved = by_hand.as_ref().and_then(|pulses_us| pulses_us[at]);
             let recorded = self.recording.as_ref().zip(row).and_then(|(it, row)| it.pulse_us(row, at + 1));
-            recorded.unwrap_or_else(|| self.scripted_us(at + 1, time_s))
+            moved.or(recorded).unwrap_or_else(|| self.scripted_us(at + 1, time_s))
         };
         Ok(Outputs { rc: RcChannels { pulse: Bounded::from_fn(self.channels, pulse), ..Default::default() } })
+    }
+}
+
+/// Refuses each of the `channels` of `key` that is among the `others`, which another key `has`.
+fn refuse_shared(
+    key: &str,
+    channels: &BTreeSet<usize>,
+    has: &str,
+    others: &BTreeSet<usize>,
+) -> Result<(), ParameterError> {
+    let shared = channels.intersection(others).map(|channel| {
+        let message = format!("`{key}` moves channel {channel}, which {has}; leave one of them out");
+        Err::<(), _>(ParameterError::conflict(key, message))
+    });
+    ParameterError::gather(shared).map(|_| ())
+}
+
+/// Warns of moves of `script`, which is sorted by start, that never act.
+fn warn_of_moves(script: &[Move], context: &NodeContext<'_>) {
+    if let Some(Move { channel, at_s, pulse_us, .. }) = never_acting(script) {
+        let message = format!(
+            "`script` moves channel {channel} twice at {at_s} s: the move to {pulse_us} µs never acts; leave it out"
+        );
+        context.warn("script", message);
+    }
+    let end_s = context.duration_s();
+    for Move { channel, at_s, .. } in script.iter().filter(|it| it.at_s >= end_s) {
+        let message = format!(
+            "`script`: channel {channel} moves at {at_s} s, and the run ends at {end_s} s: it never acts"
+        );
+        context.warn_behind_end("script", message);
     }
 }
 

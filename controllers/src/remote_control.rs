@@ -6,7 +6,7 @@
 //! pilot corrects what the battery takes. Switches move at their times.
 
 use crate::angle::wrap_rad;
-use crate::rc::check_pulse;
+use crate::pulses::check_pulse;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};

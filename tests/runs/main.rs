@@ -46,6 +46,7 @@
 //! - [`view`]: recordings in the browser: address, end, refusals
 //! - [`foxglove`]: live runs in Foxglove
 //! - [`by_hand`]: set points of a person: sent, recorded, sent again
+//! - [`gamepads`]: channels of a remote control that a gamepad moves
 //! - [`inputs`]: files that are edited after they were read
 
 mod all_faults;
@@ -72,6 +73,7 @@ mod failures;
 mod forks;
 mod forks_of_effects;
 mod foxglove;
+mod gamepads;
 mod identify;
 mod in_process;
 mod inputs;
