@@ -42,7 +42,11 @@ impl Layout {
         };
         let Some(placed) = frames.iter().filter_map(in_places).min_by_key(Placed::rank) else {
             let names: Vec<&str> = frames.iter().map(|(name, _)| *name).collect();
-            return Err(format!("its {} rotors match none of the frames {}", rotors.len(), names.join(", ")));
+            return Err(format!(
+                "its {} rotors match none of the frames {}; arrange them as one of these, or fly `kind = \"px4\"`, which takes rotors at any places",
+                rotors.len(),
+                names.join(", ")
+            ));
         };
         let Placed { frame, motors, reversed } = placed;
         if let Some(wrong) = reversed.iter().position(|is| *is != reversed[0]) {
@@ -193,6 +197,7 @@ mod tests {
         let error = Layout::of(&rotors, &MIXERS).unwrap_err();
         assert!(error.contains("QUADP") && error.contains("`left`"), "{error}");
         rotors.pop();
-        assert!(Layout::of(&rotors, &MIXERS).unwrap_err().contains("its 3 rotors"));
+        let error = Layout::of(&rotors, &MIXERS).unwrap_err();
+        assert!(error.contains("its 3 rotors") && error.contains("fly `kind = \"px4\"`"), "{error}");
     }
 }
