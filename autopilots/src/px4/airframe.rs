@@ -83,6 +83,18 @@ mod tests {
         assert!(!text.contains("-0.000000"), "{text}");
     }
 
+    /// Betaflight and ArduPilot have no frame for five rotors.
+    #[test]
+    fn five_rotors_are_described() {
+        let mut vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
+        let fifth = vehicle.rotors[0].clone();
+        vehicle.rotors.push(fifth);
+        let text = script("", &vehicle).unwrap();
+        for line in ["CA_ROTOR_COUNT 5\n", "CA_ROTOR4_PX 0.170000\n", "PWM_MAIN_FUNC5 105\n"] {
+            assert!(text.contains(&format!("param set {line}")), "{line}: {text}");
+        }
+    }
+
     #[test]
     fn lines_that_are_no_parameters_are_refused() {
         let vehicle = Vehicle::parse(vehicles::reference::HUMMINGBIRD, "hummingbird.toml").unwrap();
