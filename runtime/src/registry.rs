@@ -123,6 +123,11 @@ impl Registry {
         self.file(None, key).map(|kind| kind.role)
     }
 
+    /// True if a component declares the file whose path a process states at `key` as TOML, in which `--set` changes values.
+    pub(crate) fn has_toml_at(&self, key: &str) -> bool {
+        self.iter().filter_map(|component| component.file(key)).any(|file| file.role.is_toml())
+    }
+
     /// The names of all kinds that a manifest can use, for messages.
     #[must_use]
     pub fn names(&self) -> String {

@@ -472,6 +472,7 @@ mod tests {
     use bus::component::{Component, Info, StepError};
     use bus::context::{NodeContext, StepContext};
     use bus::messages::MotorCommand;
+    use bus::parameters::Parameter;
     use bus::{FileKind, FileRole, ParameterError, Registration};
     use controllers::controller::Controller;
     use controllers::pid::PidLaw;
@@ -534,6 +535,42 @@ mod tests {
         assert_eq!(models(&[]), ["/flight/a.toml", "/flight/table.csv"].map(PathBuf::from));
         let edited = models(&["process.source.configuration.gain=2".to_owned()]);
         assert_eq!(edited, ["/flight/a@source.toml", "/flight/table.csv"].map(PathBuf::from));
+    }
+
+    /// The file of the source as a program.
+    const AS_PROGRAM: [Parameter; 1] = [Parameter {
+        file: Some(FileKind::of(FileRole::Program)),
+        ..<Parameters as bus::Parameters>::DECLARED[0]
+    }];
+
+    /// The source under another name, which does not declare its file as TOML.
+    const OTHER: Registration = {
+        let mut other = Registration::of::<Source>();
+        other.name = "other";
+        other.parameters = &AS_PROGRAM;
+        other
+    };
+
+    /// Both, the one without TOML first.
+    const BOTH: Registry = Registry::new(&[OTHER, Registration::of::<Source>()]);
+
+    #[test]
+    fn a_value_is_set_in_a_file_that_is_toml_to_the_kind_of_its_process_and_in_no_other() {
+        let parsed = |kind: &str| {
+            let process = format!("[process.source]\nkind = \"{kind}\"\nconfiguration = \"a.txt\"\n");
+            let text = format!("[run]\nduration_s = 1.0\n{process}");
+            let set = ["process.source.configuration.gain=2".to_owned()];
+            Manifest::parse(text, "/flight/m.toml".as_ref(), &set, BOTH)
+        };
+        parsed("source").unwrap();
+        let error = parsed("other").unwrap_err().to_string();
+        for part in [
+            "--set process.source.configuration.gain=2",
+            "expected TOML, but the kind `other` does not declare it as TOML",
+            "name it: --set process.source.configuration=COPY",
+        ] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
     }
 
     #[test]

@@ -8,11 +8,12 @@ use super::content::{Content, Process};
 use super::put::put;
 use super::sources::{Source, Sources};
 use crate::registry::Registry;
-use bus::FileRole;
+use bus::parameters::Parameter;
 use diagnostics::{Diagnostic, did_you_mean, nearest};
 use inputs::InputFiles;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::Spanned;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// Key of the list of effects in a vehicle or scene file.
@@ -33,11 +34,12 @@ pub struct FileEdit {
     span: Range<usize>,
 }
 
-/// The process, the key of the file, and the keys in it, where `keys` lead into a file that is TOML to the components of `registry`.
+/// The process, the key of the file, and the keys in it, where `keys` lead into a file that is TOML to a component of `registry`. The kind
+/// of the process is not known yet: [`all`] refuses one that does not declare the file as TOML.
 pub fn split<'k, 's>(keys: &'k [&'s str], registry: Registry) -> Option<(&'s str, &'s str, &'k [&'s str])> {
     let ["process", process, file, rest @ ..] = keys else { return None };
     let is_file = Process::file_keys().any(|key| key == *file);
-    let is_toml = is_file && registry.file_role(file).is_some_and(FileRole::is_toml);
+    let is_toml = is_file && registry.has_toml_at(file);
     (is_toml && !rest.is_empty()).then_some((*process, *file, rest))
 }
 
@@ -84,7 +86,7 @@ pub fn edited_files<'s>(
 /// Values in files that are given with `--set`, in their order.
 ///
 /// # Errors
-/// If there is no such process, or it does not name such a file.
+/// If there is no such process, it does not name such a file, or its kind does not declare the file as TOML.
 pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagnostic> {
     let parse = |source: &Source| FileEdit::parse(&source.text, source.base, sources.registry);
     let edits = sources.overrides().filter_map(parse);
@@ -163,6 +165,7 @@ impl FileEdit {
             let help = did_you_mean(name, known, "the processes are");
             return Err(sources.problem(&self.span, format!("there is no process `{name}`"), help));
         };
+        self.require_toml(process, sources)?;
         let is_over_file = process.parameters.keys().any(|parameter| *parameter.get_ref() == self.file);
         if is_over_file {
             let message = format!(
@@ -179,6 +182,27 @@ impl FileEdit {
         let file = &self.file;
         let help = format!(
             "add {file} = \"PATH\" to [process.{name}], or give --set process.{name}.{file}=PATH, too"
+        );
+        Err(sources.problem(&self.span, message, help))
+    }
+
+    /// Refuses the edit if the kind of `process` has the file as a parameter and does not declare it as TOML: another kind declares it.
+    fn require_toml(&self, process: &Process, sources: &Sources) -> Result<(), Diagnostic> {
+        let Some(kind) = process.kind.as_ref().map(Spanned::get_ref) else { return Ok(()) };
+        let component = sources.registry.find(kind).map(|component| component.parameters);
+        let program = || sources.registry.program(kind).map(|program| program.parameters);
+        let parameters = component.or_else(program).unwrap_or_default();
+        let is_toml = |parameter: &Parameter| parameter.file.is_some_and(|file| file.role.is_toml());
+        if parameters.iter().find(|parameter| parameter.name == self.file).is_none_or(is_toml) {
+            return Ok(());
+        }
+        let (name, file) = (&self.process, &self.file);
+        let message = format!(
+            "cannot set a value in the {file} file of process `{name}`: expected TOML, but the kind `{kind}` does not declare it as TOML"
+        );
+        let help = format!(
+            "change a copy of the file, and name it: --set process.{name}.{file}=COPY; a component in Rust declares a file of TOML with \
+             #[parameter(file = …)]"
         );
         Err(sources.problem(&self.span, message, help))
     }
