@@ -95,6 +95,7 @@ mod tests {
             ("scene", FileRole::Model),
             ("gains", FileRole::Settings),
             ("firmware", FileRole::Program),
+            ("data", FileRole::Data),
         ];
         for component in COMPONENTS.iter() {
             for (name, role) in roles {

@@ -4,11 +4,11 @@
 //! The set points enter the run as the samples of its output, so that a recording has them. A run of the same
 //! manifest with `data`, that recording, sends the same samples again, at the same ticks.
 
-use bus::OutputPorts;
 use bus::asked::{Asked, AskedFile};
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
+use bus::{FileKind, OutputPorts};
 use diagnostics::parameter::{ParameterError, refuse, up_to};
 use recorder::reader::Recording;
 use serde::Deserialize;
@@ -43,6 +43,7 @@ pub struct Parameters {
     #[parameter(range = "`hold`, `level`, `land`", example = "\"level\"")]
     fallback: Fallback,
     /// Recording of such a run, relative to the manifest, whose set points are sent instead.
+    #[parameter(file = FileKind::DATA)]
     data: Option<PathBuf>,
     /// Topic of these set points in the recording.
     #[parameter(shown = "`/NAME/set_point` of this process, or the only one")]

@@ -2,10 +2,10 @@
 
 use crate::set_points::{ALTITUDES_EXPECTED, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
 use crate::sticks::Sticks;
-use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
+use bus::{FileKind, OutputPorts};
 use diagnostics::parameter::{ParameterError, refuse};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -20,6 +20,7 @@ pub struct Parameters {
     #[parameter(default = Vec::new())]
     set_points: Vec<SetPointEntry>,
     /// Recording of sticks, relative to the manifest; `set_points` then has other channels only.
+    #[parameter(file = FileKind::DATA)]
     data: Option<PathBuf>,
     /// Time in the recording at which tick 0 lies; below 0 the sticks act that much later than recorded.
     #[parameter(default = 0.0)]

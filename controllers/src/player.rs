@@ -6,7 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{MeasuredState, MotorCommand, Quaternion};
 use diagnostics::parameter::{ParameterError, refuse};
-use inputs::InputFiles;
+use inputs::{FileKind, InputFiles};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -14,6 +14,7 @@ use std::path::PathBuf;
 #[derive(Debug, bus::Parameters)]
 pub struct Parameters {
     /// CSV file of the flight, relative to the manifest.
+    #[parameter(file = FileKind::DATA)]
     data: PathBuf,
     /// Time in the flight, from its first row, at which tick 0 lies.
     #[parameter(default = 0.0, range = "within the flight")]

@@ -10,7 +10,7 @@ use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, refuse};
-use inputs::InputFiles;
+use inputs::{FileKind, InputFiles};
 use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,7 @@ pub struct Parameters {
     #[parameter(default = Vec::new(), table = Move, entry = "N")]
     script: Vec<Move>,
     /// Recording of a receiver, relative to the manifest; `script` then has other channels only.
+    #[parameter(file = FileKind::DATA)]
     data: Option<PathBuf>,
     /// Time in the recording at which tick 0 lies.
     #[parameter(default = 0.0)]

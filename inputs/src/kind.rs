@@ -39,9 +39,15 @@ pub enum FileRole {
     Settings,
     /// Program, which reads files beside it.
     Program,
+    /// Data over time, such as a recorded flight. The recording of a run does not hold the file. A command opens a device or a folder in
+    /// its place itself.
+    Data,
 }
 
 impl FileKind {
+    /// Kind of data over time.
+    pub const DATA: Self = Self::of(FileRole::Data);
+
     /// Kind of files that name no other files.
     #[must_use]
     pub const fn of(role: FileRole) -> Self {

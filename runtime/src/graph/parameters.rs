@@ -165,7 +165,9 @@ fn resolved<'a>(
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let (mut parameters, mut edited, mut has_program) = (stated(declared)?, Vec::new(), false);
     for (key, file) in process.files() {
-        has_program |= file_kind(declared, key).is_some_and(|kind| kind.role == FileRole::Program);
+        let role = file_kind(declared, key).map(|kind| kind.role);
+        let is_data = role == Some(FileRole::Data);
+        has_program |= role == Some(FileRole::Program);
         let original = manifest.resolve(file)?;
         let copy = manifest.with_edits(declared.files, name.get_ref(), key, original.clone())?;
         let path = copy.to_string_lossy().into_owned();
@@ -178,12 +180,12 @@ fn resolved<'a>(
         }
         let named = named_files(declared, read, key, path.into());
         if program.component().is_none() {
-            read_named(read, key, &named).map_err(|message| {
+            read_named(read, key, &named, is_data).map_err(|message| {
                 let message = format!("process `{}`: {message}", name.get_ref());
                 manifest.problem(&file.span(), message, "correct the path, which is relative to the manifest")
             })?;
         }
-        if key != "data" {
+        if !is_data {
             notes.models.extend(named);
         }
     }
@@ -326,10 +328,10 @@ fn named_files(declared: &DeclaredNode<'_>, files: &InputFiles, key: &str, path:
     std::iter::once(path).chain(others).collect()
 }
 
-/// Reads the files that a command names, which are not checked before it starts. The program alone knows its `data`:
-/// a device or a folder is left to it.
-fn read_named(files: &InputFiles, key: &str, named: &[PathBuf]) -> Result<(), String> {
-    let is_left = |path: &&PathBuf| key == "data" && !path.is_file();
+/// Reads the files that a command names at `key`, which are not checked before it starts. The program alone knows its data: a device or a
+/// folder is left to it.
+fn read_named(files: &InputFiles, key: &str, named: &[PathBuf], is_data: bool) -> Result<(), String> {
+    let is_left = |path: &&PathBuf| is_data && !path.is_file();
     named.iter().filter(|path| !is_left(path)).try_for_each(|path| {
         let read = files.bytes(path).map(drop);
         read.map_err(|cause| format!("`{key}`: cannot read {}: {cause}", path.display()))
@@ -465,7 +467,7 @@ fn place(declared: &DeclaredNode<'_>, key: &str) -> Range<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::kept_by_another_kind;
+    use super::{kept_by_another_kind, read_named};
     use crate::graph::Graph;
     use crate::manifest::Manifest;
     use crate::registry::Registry;
@@ -537,22 +539,45 @@ mod tests {
         assert_eq!(edited, ["/flight/a@source.toml", "/flight/table.csv"].map(PathBuf::from));
     }
 
-    /// The file of the source as a program.
-    const AS_PROGRAM: [Parameter; 1] = [Parameter {
-        file: Some(FileKind::of(FileRole::Program)),
-        ..<Parameters as bus::Parameters>::DECLARED[0]
-    }];
+    /// The file of the source in another role.
+    const fn with_role(role: FileRole) -> [Parameter; 1] {
+        let configuration = <Parameters as bus::Parameters>::DECLARED[0];
+        [Parameter { file: Some(FileKind::of(role)), ..configuration }]
+    }
 
-    /// The source under another name, which does not declare its file as TOML.
-    const OTHER: Registration = {
-        let mut other = Registration::of::<Source>();
-        other.name = "other";
-        other.parameters = &AS_PROGRAM;
-        other
-    };
+    const AS_PROGRAM: [Parameter; 1] = with_role(FileRole::Program);
+    const AS_DATA: [Parameter; 1] = with_role(FileRole::Data);
 
-    /// Both, the one without TOML first.
-    const BOTH: Registry = Registry::new(&[OTHER, Registration::of::<Source>()]);
+    /// The source under another `name`, with its file in another role.
+    const fn source(name: &'static str, parameters: &'static [Parameter]) -> Registration {
+        let mut source = Registration::of::<Source>();
+        source.name = name;
+        source.parameters = parameters;
+        source
+    }
+
+    /// A source that does not declare its file as TOML, and one that does.
+    const BOTH: Registry = Registry::new(&[source("other", &AS_PROGRAM), Registration::of::<Source>()]);
+
+    /// A source whose file is data.
+    const OF_DATA: Registry = Registry::new(&[source("recorded", &AS_DATA)]);
+
+    #[test]
+    fn a_run_does_not_record_a_file_that_is_declared_as_data() {
+        let text = "[run]\nduration_s = 1.0\n[process.source]\nkind = \"recorded\"\nconfiguration = \"/flight/a.csv\"\n";
+        let manifest = Manifest::parse(text.to_owned(), "/flight/m.toml".as_ref(), &[], OF_DATA).unwrap();
+        let files = InputFiles::default();
+        files.keep("/flight/a.csv".as_ref(), b"time_s\n0\n".to_vec());
+        assert_eq!(Graph::build_from(&manifest, files).unwrap().models, Vec::<PathBuf>::new());
+    }
+
+    #[test]
+    fn a_folder_in_the_place_of_data_is_left_to_the_command() {
+        let folder = [std::env::temp_dir()];
+        let read = |is_data| read_named(&InputFiles::default(), "data", &folder, is_data);
+        assert_eq!(read(true), Ok(()));
+        assert!(read(false).unwrap_err().starts_with("`data`: cannot read "));
+    }
 
     #[test]
     fn a_value_is_set_in_a_file_that_is_toml_to_the_kind_of_its_process_and_in_no_other() {
