@@ -1,7 +1,7 @@
 //! Backups requested in flight, checked against a manifest of this package.
 
 use crate::COMPONENTS;
-use runtime::graph::{Graph, backup_of};
+use runtime::graph::{Graph, backup_of, successor_of};
 use runtime::manifest::Manifest;
 use std::path::Path;
 
@@ -48,6 +48,21 @@ fn a_backup_in_a_live_run_that_cannot_be_is_refused_with_its_place() {
     assert!(message.starts_with("--with:2:1: unknown key `knid`"), "{message}");
     assert!(refused("controller", "parameters.gain = 3").contains("--with:1:12: process `controller`"));
     assert!(refused("controller", "x = ").starts_with("--with:1:"));
+}
+
+/// As `check` does for a swap in the manifest.
+#[test]
+fn a_live_swap_to_a_refused_vehicle_has_the_warnings_that_may_explain_it() {
+    let (manifest, graph) = hover();
+    let vehicle = Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles/hummingbird.toml");
+    let text = std::fs::read_to_string(vehicle).unwrap();
+    let heavy = text.replace("mass = { value = 0.480,", "mass = { value = 1000.0,");
+    graph.files.keep("/heavy.toml".as_ref(), heavy.into_bytes());
+    let swap = successor_of(&manifest, &graph.plan, &graph.files, "plant", "vehicle = \"/heavy.toml\"");
+    let fault = swap.map(drop).unwrap_err();
+    assert!(fault.to_string().contains("cannot fly"), "{fault}");
+    let warnings: Vec<String> = fault.warnings().iter().map(ToString::to_string).collect();
+    assert!(warnings.iter().any(|warning| warning.contains("moment of inertia")), "{warnings:?}");
 }
 
 #[test]

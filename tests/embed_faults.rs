@@ -487,7 +487,7 @@ fn a_swap_for_what_fails_is_refused_and_the_run_flies_on() {
                 stop.stop();
                 assert!(matches!(paused, Answer::Done { .. }), "{paused:?}");
                 assert!(matches!(resumed, Answer::Done { .. }), "{resumed:?}");
-                let Answer::Refused { reason } = refused else { panic!("{refused:?}") };
+                let Answer::Refused { reason, .. } = refused else { panic!("{refused:?}") };
                 assert!(reason.contains("the propeller came off"), "{reason}");
             });
             // Paced, so that the swap is asked for in time even if its thread starts late.

@@ -197,13 +197,13 @@ fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
         told["manifest"] = run.entry.manifest.to_string_lossy().into();
         output::print_json_line(&told)?;
     }
-    if let Answer::Done { warnings, .. } = &answer {
+    if let Answer::Done { warnings, .. } | Answer::Refused { warnings, .. } = &answer {
         warnings.iter().for_each(|warning| output::say(&format!("warning: {warning}")));
     }
     let manifest = run.entry.manifest.file_name().unwrap_or_default().display();
     let of_run = |text: &str| format!("run {} ({manifest}): {text}", run.entry.run_id);
     match answer {
-        Answer::Refused { reason } => bail!("{reason}"),
+        Answer::Refused { reason, .. } => bail!("{reason}"),
         _ if json => Ok(()),
         Answer::Done { text, .. } if run_id.is_some() => output::print_text(&text),
         // The user did not name the run: the answer does.

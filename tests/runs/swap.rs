@@ -264,6 +264,7 @@ fn a_live_swap_to_a_sensor_with_new_measurements_at_other_ticks_is_warned_of() {
     let swap = |with: &str| place.start(&["swap", "gps", "--with", with, "--run", &run, "--json"]);
     let first = swap("parameters.rate_hz = 20.0");
     launch.await_slot("gps", 1);
+    refuse_heavy(&place, &run);
     launch.release();
     let told = ["warning: ", "0, 80, 130, 180, … (20 Hz)", "some of its samples are never sent"];
     let ended = first.end_among_others().with_code(0);
@@ -271,6 +272,18 @@ fn a_live_swap_to_a_sensor_with_new_measurements_at_other_ticks_is_warned_of() {
     let answer = ended.json();
     assert!(answer["warnings"][0].as_str().unwrap().contains("as before"), "{answer}");
     launch.end().with_code(1);
+}
+
+/// Asks `run` for a swap of the plant to a vehicle that is too heavy to fly: the refusal has the warning about it.
+fn refuse_heavy(place: &Place, run: &str) {
+    let text = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    let heavy =
+        place.write("heavy.toml", text.replace("mass = { value = 0.480,", "mass = { value = 1000.0,"));
+    let with = format!("vehicle = {heavy:?}");
+    let swap = ["swap", "plant", "--with", &with, "--run", run, "--json"];
+    let ended = place.start(&swap).end_among_others().with_code(2);
+    ended.says(&["cannot fly", "warning: ", "moment of inertia"]);
+    assert!(ended.json()["warnings"][0].as_str().unwrap().contains("moment of inertia"), "{ended}");
 }
 
 /// The last measurement of its gps arrives at tick 1480.

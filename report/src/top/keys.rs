@@ -96,7 +96,7 @@ impl Keys {
         std::thread::spawn(move || {
             let text = match client::ask(&run, &request) {
                 Ok(Answer::Done { text, .. }) => text,
-                Ok(Answer::Refused { reason }) => reason,
+                Ok(Answer::Refused { reason, .. }) => reason,
                 Ok(Answer::Status(status)) => status.to_string(),
                 Err(error) => error.with_causes(),
             };

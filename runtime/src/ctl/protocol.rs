@@ -93,13 +93,16 @@ pub enum Answer {
     Refused {
         /// Reason of the refusal.
         reason: String,
+        /// Legal but unusual values of a process that was to be swapped in, which may explain the refusal.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        warnings: Vec<String>,
     },
 }
 
 impl Answer {
     /// A refusal.
     pub fn refused(reason: impl Into<String>) -> Self {
-        Self::Refused { reason: reason.into() }
+        Self::Refused { reason: reason.into(), warnings: Vec::new() }
     }
 }
 

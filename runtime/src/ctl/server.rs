@@ -60,7 +60,7 @@ enum Place {
 /// let launcher = Launcher::new(Host::Threads);
 /// let remote = launcher.remote();
 /// drop(launcher);
-/// let Answer::Refused { reason } = remote.ask(Request::Pause) else { panic!("it flies") };
+/// let Answer::Refused { reason, .. } = remote.ask(Request::Pause) else { panic!("it flies") };
 /// assert_eq!(reason, "the run ended first");
 /// ```
 #[derive(Clone, Debug)]

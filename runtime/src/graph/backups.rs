@@ -79,13 +79,7 @@ pub fn successor_of(
     process: &str,
     with_text: &str,
 ) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic> {
-    let mut notes = Notes::default();
-    let backup = noting_backup_of(manifest, plan, files, (process, with_text), &mut notes)?;
-    let (manifest, _, whole) = manifest.succeed(process, with_text)?;
-    let declared_nodes = declared_nodes(&manifest, files)?;
-    let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
-    run.require_state(&backup, &whole.span())?;
-    Ok((backup, notes.warnings))
+    noted_backup_of(manifest, plan, files, (process, with_text), Purpose::TakeOver)
 }
 
 /// The backup of `process` in a run of `manifest` by `plan` that is under way; `with_text` is TOML with its
@@ -101,26 +95,51 @@ pub fn backup_of(
     process: &str,
     with_text: &str,
 ) -> Result<BackupSpec, Diagnostic> {
-    noting_backup_of(manifest, plan, files, (process, with_text), &mut Notes::default())
+    noted_backup_of(manifest, plan, files, (process, with_text), Purpose::Any).map(|(backup, _)| backup)
 }
 
-/// As [`backup_of`], of a process and the text with its differences; notes unusual values.
-fn noting_backup_of(
+/// Purpose of a requested backup.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// It takes over.
+    TakeOver,
+    /// It takes over or shadows.
+    Any,
+}
+
+/// The backup for this `purpose` of a process by the text with its differences, and its legal but unusual values. A fault has the warnings
+/// that may explain it.
+fn noted_backup_of(
     manifest: &Manifest,
     plan: &Plan,
     files: &InputFiles,
     (process, with_text): (&str, &str),
-    notes: &mut Notes,
-) -> Result<BackupSpec, Diagnostic> {
+    purpose: Purpose,
+) -> Result<(BackupSpec, Vec<Diagnostic>), Diagnostic> {
     let (manifest, name, whole) = manifest.succeed(process, with_text)?;
     let declared_nodes = declared_nodes(&manifest, files)?;
     let run = Run { manifest: &manifest, plan, declared_nodes: &declared_nodes };
-    let node = run.node(&name)?;
-    let backup = run.resolve(node, whole.get_ref(), &whole.span(), notes)?;
-    Ok(BackupSpec { with: Some(with_text.to_owned()), ..backup })
+    let mut notes = Notes::default();
+    let backup = run.requested(&name, &whole, purpose, &mut notes).map_err(|fault| notes.explain(fault))?;
+    Ok((BackupSpec { with: Some(with_text.to_owned()), ..backup }, notes.warnings))
 }
 
 impl Run<'_> {
+    /// The backup `whole` of the process `name`, for this `purpose`.
+    fn requested(
+        &self,
+        name: &Spanned<String>,
+        whole: &Spanned<Process>,
+        purpose: Purpose,
+        notes: &mut Notes,
+    ) -> Result<BackupSpec, Diagnostic> {
+        let backup = self.resolve(self.node(name)?, whole.get_ref(), &whole.span(), notes)?;
+        if purpose == Purpose::TakeOver {
+            self.require_state(&backup, &whole.span())?;
+        }
+        Ok(backup)
+    }
+
     /// The node named `process`, if another process can go on in its place.
     fn node(&self, process: &Spanned<String>) -> Result<usize, Diagnostic> {
         let name = process.get_ref();

@@ -9,6 +9,7 @@ use crate::view::View;
 use crate::world::World;
 use anyhow::{Result, bail};
 use bus::plan::Plan;
+use diagnostics::Diagnostic;
 
 /// Ticks that a backup shadows where a request does not say.
 const SHADOW_TICKS: u32 = 100;
@@ -61,6 +62,15 @@ fn answer(report: &Report, warnings: Vec<String>) -> Answer {
     }
 }
 
+/// The answer to a swap that is refused before its backup starts, with the warnings that may explain the refusal.
+fn refusal(error: &anyhow::Error) -> Answer {
+    let warnings: &[Diagnostic] = error.downcast_ref::<Diagnostic>().map_or(&[], Diagnostic::warnings);
+    Answer::Refused {
+        reason: error.to_string(),
+        warnings: warnings.iter().map(ToString::to_string).collect(),
+    }
+}
+
 impl<W: World> Supervisor<'_, W> {
     /// Serves the requests to the run, and answers swaps that have ended.
     pub(super) fn serve_requests(&mut self) {
@@ -69,7 +79,7 @@ impl<W: World> Supervisor<'_, W> {
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
                 Ok((request, warnings)) => self.swaps.push((request, warnings, reply)),
-                Err(refused) => self.world.answer(reply, &Answer::refused(refused.to_string())),
+                Err(error) => self.world.answer(reply, &refusal(&error)),
             }
         }
         for (request, warnings, reply) in std::mem::take(&mut self.swaps) {

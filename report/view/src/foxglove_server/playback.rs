@@ -145,7 +145,7 @@ impl Playback {
         let (done, answered) = mpsc::channel();
         let ask = move || {
             for request in requests {
-                if let Answer::Refused { reason } = live.ask(&request) {
+                if let Answer::Refused { reason, .. } = live.ask(&request) {
                     refuse(&refusals, reason);
                     break;
                 }
