@@ -4,6 +4,7 @@ use crate::process::Scratch;
 use crate::settings;
 use bus::context::NodeContext;
 use diagnostics::ParameterError;
+use diagnostics::parameter::refuse;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs;
@@ -64,6 +65,9 @@ impl Build {
         };
         let bin = source.parent().unwrap_or(&source);
         let folder = bin.parent().unwrap_or(bin);
+        if let Err(outside) = require_build(firmware, bin, folder) {
+            return Err(program.err().unwrap_or(outside));
+        }
         let mut names = Vec::new();
         for scripts in SCRIPTS {
             let used = file_names(&folder.join(scripts)).filter(|name| is_script(scripts, name));
@@ -130,6 +134,18 @@ impl Build {
     }
 }
 
+/// Refuses a program at `firmware` that is in no build: both files beside it in `bin` and those of the start-up in `folder` are missing.
+fn require_build(firmware: &Path, bin: &Path, folder: &Path) -> Result<(), ParameterError> {
+    let is_outside = !bin.join(ALIASES).is_file() && !folder.join(AIRFRAMES).is_dir();
+    refuse(is_outside, "firmware", || {
+        format!(
+            "{}: the program is outside of a build of PX4: expected the file {ALIASES} beside it, and the folder `etc` of the build beside \
+             that of the program; name the program in its build, build/px4_sitl_default/bin/px4",
+            firmware.display()
+        )
+    })
+}
+
 /// True for a script that the start-up may run; the other `rcS` is for boards.
 fn is_script(folder: &str, name: &OsStr) -> bool {
     let name = name.to_string_lossy();
@@ -187,6 +203,16 @@ mod tests {
         assert_eq!(commands(aliases).collect::<Vec<_>>(), ["px4-ekf2", "px4-x"]);
         assert!(relative(aliases).starts_with("R=./\nalias set=_set\n"));
         assert_eq!(in_order("if a\n\tekf2 start &\nb && c\n"), "if a\n\tekf2 start\nb && c\n");
+    }
+
+    #[test]
+    fn a_program_outside_of_a_build_is_refused_with_one_error() {
+        let firmware = Path::new("/nowhere/bin/px4");
+        let told = Build::read(&NodeContext::new("px4", &[]), firmware, "none_iris").unwrap_err();
+        assert_eq!(told.into_each().len(), 1, "a missing program");
+        let outside = require_build(firmware, Path::new("/nowhere/bin"), Path::new("/nowhere"));
+        let told = outside.unwrap_err().to_string();
+        assert!(told.contains("outside of a build of PX4: expected the file px4-alias.sh"), "{told}");
     }
 
     #[test]
