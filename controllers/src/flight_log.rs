@@ -322,15 +322,14 @@ impl Source<'_> {
     /// Refuses a file with too few rows, or with rows of another length than the header's, as with decimal commas.
     fn check_rows(&self) -> Result<(), ParameterError> {
         self.table.check_lengths().map_err(|cause| refused(self.path, format_args!(": {cause}")))?;
-        let (rows, expected) = (&self.table.rows, self.table.headers.len());
+        let rows = &self.table.rows;
         if rows.len() < 2 {
             let fault = format_args!(": it has {} rows of data, expected at least 2", rows.len());
             return Err(refused(self.path, fault));
         }
-        let Some(row) = rows.iter().find(|row| row.len() != expected) else { return Ok(()) };
-        let (line, found) = (row.line, row.len());
-        let fault = format_args!(", line {line}: expected {expected} cells as in the header, found {found}");
-        Err(refused(self.path, fault))
+        let of_row = |row: table::Row<'_>| self.table.fault_of_length(row).map(|fault| (row.line, fault));
+        let Some((line, fault)) = rows.iter().find_map(of_row) else { return Ok(()) };
+        Err(refused(self.path, format_args!(", line {line}: {fault}")))
     }
 
     /// The times since the first row, which have to grow.

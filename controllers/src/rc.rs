@@ -252,16 +252,14 @@ struct Source<'a> {
 impl Source<'_> {
     /// Refuses the first row of another length than the header's.
     fn require_lengths(&self) -> Result<(), ParameterError> {
-        let expected = self.table.headers.len();
-        let Some(row) = self.table.rows.iter().find(|row| row.len() != expected) else { return Ok(()) };
-        let (line, found) = (row.line, row.len());
-        let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
-        Err(refused(self.file, fault))
+        let of_row = |row: Row<'_>| self.table.fault_of_length(row).map(|fault| (row.line, fault));
+        let Some((line, fault)) = self.table.rows.iter().find_map(of_row) else { return Ok(()) };
+        Err(refused(self.file, format_args!(":{line}: {fault}")))
     }
 
     /// The rows that are as long as the header: others are refused for their length.
     fn whole_rows(&self) -> impl Iterator<Item = Row<'_>> {
-        self.table.rows.iter().filter(|row| row.len() == self.table.headers.len())
+        self.table.rows.iter().filter(|row| self.table.fault_of_length(*row).is_none())
     }
 
     /// Times, which have to grow, of the column `place`.

@@ -178,13 +178,8 @@ impl Source<'_> {
     }
 
     fn require_length(&self, cells: table::Row<'_>) -> Result<(), ParameterError> {
-        let (expected, found) = (self.table.headers.len(), cells.len());
-        if found == expected {
-            return Ok(());
-        }
-        let line = cells.line;
-        let fault = format_args!(":{line}: expected {expected} cells as in the header, found {found}");
-        Err(refused(self.file, fault))
+        let Some(fault) = self.table.fault_of_length(cells) else { return Ok(()) };
+        Err(refused(self.file, format_args!(":{}: {fault}", cells.line)))
     }
 
     fn row(&self, cells: table::Row<'_>, before: Option<&Row>) -> Result<Row, ParameterError> {

@@ -55,8 +55,13 @@ const REPRESENTATIVE: [&str; 24] = [
 ];
 
 /// True for the manifests that quick tests of all shipped ones take.
-pub fn is_representative(path: &str) -> bool {
-    REPRESENTATIVE.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
+fn is_representative(path: &str) -> bool {
+    is_shipped_as(&REPRESENTATIVE, path)
+}
+
+/// True if `path` is that of a shipped manifest with one of these `names`.
+fn is_shipped_as(names: &[&str], path: &str) -> bool {
+    names.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
 }
 
 /// Some of those: effects in detail, joints, a rig, a radio link, a node of another program, steps that take time, and a node that is replaced.
@@ -77,7 +82,7 @@ const BRIEF: [&str; 12] = [
 
 /// True for the manifests that quick tests take where each is flown several times.
 pub fn is_brief(path: &str) -> bool {
-    BRIEF.iter().any(|name| path.ends_with(&format!("/manifests/{name}.toml")))
+    is_shipped_as(&BRIEF, path)
 }
 
 /// Manifests in the folders below that fly by themselves: no sets, campaigns and autopilots, which are parts of

@@ -129,6 +129,13 @@ impl Table {
         Err(TableError::LongRows { header_line, line, expected, found })
     }
 
+    /// Returns the fault of a `row` of another length than the header's, in words that follow its line.
+    #[must_use]
+    pub fn fault_of_length(&self, row: Row<'_>) -> Option<String> {
+        let (expected, found) = (self.headers.len(), row.len());
+        (found != expected).then(|| format!("expected {expected} cells as in the header, found {found}"))
+    }
+
     /// Number of cells behind those of the header; empty ones at the end do not count.
     fn extra_cells(&self, row: Row<'_>) -> usize {
         if row.len() <= self.headers.len() {
@@ -193,5 +200,13 @@ mod tests {
         assert_eq!(rows(5).unwrap().rows.len(), 5);
         let error = rows(6).err().unwrap().to_string();
         assert_eq!(error, "it has more than 5 rows; cut it into several files, or leave out rows");
+    }
+
+    #[test]
+    fn a_row_of_another_length_than_the_header_has_a_fault() {
+        let table = Table::parse(b"a,b\n1,2\n3\n4,5,6\n", &["a", "b"], &Dialect::default()).ok().unwrap();
+        let faults: Vec<_> = table.rows.iter().map(|row| table.fault_of_length(row)).collect();
+        let found = |count: usize| Some(format!("expected 2 cells as in the header, found {count}"));
+        assert_eq!(faults, [None, found(1), found(3)]);
     }
 }
