@@ -123,6 +123,17 @@ const seen = await withPage(address, async (page, wrong) => {
   found.marks = await page.evaluate(() => window.hummingbus.scopes.marks.filter(({ kind }) => kind === "swap"));
   found.swapped = await look();
 
+  // A sensor whose measurements come at other ticks, which is warned of.
+  await page.focus("#run-swap");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#swap[open]");
+  await page.select("#swap-process", "mocap");
+  await type("#swap-with", "parameters.rate_hz = 20.0");
+  await page.focus("#swap-yes");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => !document.getElementById("swap").open);
+  found.warned = await look();
+
   // A second page sees what the first one asked for.
   const other = await page.browser().newPage();
   await other.goto(address, { waitUntil: "load" });

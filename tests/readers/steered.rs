@@ -102,6 +102,7 @@ fn require_controls(seen: &Value) {
         (&seen["marks"][0]["text"], seen["marks"].as_array().unwrap().len()),
         (&json!("swap of controller"), 1)
     );
+    require_warning(&seen["warned"]);
     assert_eq!(seen["other"]["shown"], "paused");
     assert_eq!((&seen["kept"]["shown"], &seen["ended"]["shown"]), (&json!("paused"), &json!("ended")));
     assert!(seen["ended"]["answer"].as_str().unwrap().contains("has ended at tick"), "{}", seen["ended"]);
@@ -109,6 +110,18 @@ fn require_controls(seen: &Value) {
     for look in ["running", "paused", "refused", "ended"] {
         assert_eq!(seen[look]["overflow"], 0, "{look}");
     }
+}
+
+/// The swap is done, and its warning stands below, on a line of its own.
+fn require_warning(seen: &Value) {
+    let answer = seen["answer"].as_str().unwrap();
+    let mut lines = answer.lines();
+    assert!(
+        lines.next().is_some_and(|line| line.contains("mocap") && line.contains("flies from")),
+        "{answer}"
+    );
+    let is_warning = |line: &str| line.starts_with("warning: ") && line.contains("sent more than once");
+    assert!(lines.next().is_some_and(is_warning) && seen["isWrong"] == false, "{answer}");
 }
 
 /// The processes of the hover stand in the order in which they compute, and each bar begins where those end that it waits for.

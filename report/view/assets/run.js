@@ -16,6 +16,10 @@ const get = (id) => document.getElementById(id);
 const option = (value) => Object.assign(document.createElement("option"), { value, textContent: /\d/.test(value) ? `×${value}` : value });
 const ticksText = (ticks) => (ticks === 1 ? "1 tick" : `${ticks} ticks`);
 
+/** The answer of a run in words; each warning begins a line. */
+const words = ({ answer, text, reason, warnings = [] }) =>
+  [answer === "done" ? text : `Refused: ${reason}`, ...warnings.map((warning) => `warning: ${warning}`)].join("\n");
+
 /** Hears the server for as long as the page is open, and calls `heard` with each of its events. */
 export function hear(heard, report) {
   const source = new EventSource("api/events");
@@ -131,9 +135,8 @@ export class RunControls {
     try {
       const answer = await ask(request);
       const isDone = answer.answer === "done";
-      const done = [answer.text, ...(answer.warnings ?? [])].join("; warning: ");
       // A later request has the place by now.
-      if (number === this.asking || !isDone) say(isDone ? done : `Refused: ${answer.reason}`, !isDone);
+      if (number === this.asking || !isDone) say(words(answer), !isDone);
       // The news of the end may have come before.
       if (isDone && request.request === "swap") this.#markSwap(request, answer);
       if (isDone) this.#sayEnd();
