@@ -47,9 +47,14 @@ pub fn several_winds(
     let one = problem.fitted(&values, &shared);
     problem.allow_trims_of(&one, &all);
     let [one, several] = [one, several].map(|fit| problem.fitted(&fit.values, &fit.free));
-    let is_gain = p_value(&one.validation_costs, &several.validation_costs) < FALSE_RATE
-        && several.validation_cost() < (1.0 - LEAST_GAIN) * one.validation_cost();
-    is_gain.then_some((all, several))
+    is_gain(&one.validation_costs, &several.validation_costs).then_some((all, several))
+}
+
+/// True if `several` winds explain more than `one`, by the squared errors of the blocks of the validation data: by at least [`LEAST_GAIN`] of
+/// them, and by more than chance.
+fn is_gain(one: &[f64], several: &[f64]) -> bool {
+    let [of_one, of_several] = [one, several].map(|costs| costs.iter().sum::<f64>());
+    of_several < (1.0 - LEAST_GAIN) * of_one && p_value(one, several) < FALSE_RATE
 }
 
 /// True for effects by which a wind acts, and for one number of the thrust of all rotors, which the lift of a wind changes.
@@ -150,6 +155,24 @@ mod tests {
             all.iter().filter(|candidate| acts(candidate)).map(|candidate| candidate.kind.name).collect();
         names.sort_unstable();
         assert_eq!(names, ["parasitic-drag", "rotor-drag", "thrust-scale", "translational-lift"]);
+    }
+
+    #[test]
+    fn several_winds_need_two_percent_of_the_squared_error() {
+        let is_gain_to = |cost: f64| is_gain(&[100.0; 20], &[cost; 20]);
+        assert!(is_gain_to(97.0));
+        assert!(!is_gain_to(98.5), "beyond chance, but 1.5 %");
+        assert!(!is_gain_to(100.0) && !is_gain_to(110.0));
+    }
+
+    /// One of twenty blocks has all of the gain, 12 % of the squared error. Six blocks that agree may do so by chance, with 1/64.
+    #[test]
+    fn several_winds_need_a_gain_beyond_chance() {
+        let (mut one, mut several) = ([100.0; 20], [101.0; 20]);
+        (one[7], several[7]) = (400.0, 100.0);
+        assert!(!is_gain(&one, &several));
+        assert!(!is_gain(&[100.0; 6], &[50.0; 6]));
+        assert!(is_gain(&[100.0; 7], &[50.0; 7]));
     }
 
     #[test]
