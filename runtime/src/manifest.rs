@@ -335,6 +335,14 @@ impl Manifest {
         process.file(key)
     }
 
+    /// True if the process `name` is a component that reads the file `key` as TOML, and reports its faults.
+    fn is_read_as_toml(&self, name: &str, key: &str) -> bool {
+        let process = self.content.process.iter().find(|(other, _)| other.get_ref() == name);
+        let kind = process.and_then(|(_, process)| process.kind.as_ref());
+        let component = kind.and_then(|kind| self.registry().find(kind.get_ref()));
+        component.and_then(|component| component.file(key)).is_some_and(|file| file.role.is_toml())
+    }
+
     /// The file at `path`, the value of `key` of the process `name`: where `--set` changes values in it, an edited copy that
     /// `files` keeps.
     ///
@@ -353,6 +361,9 @@ impl Manifest {
         let is_edited = !edits.is_empty() && original.as_ref() == Some(&path);
         // A file that cannot be read is refused by its reader.
         let Some(text) = is_edited.then(|| files.text(&path).ok()).flatten() else { return Ok(path) };
+        if !self.is_read_as_toml(name, key) {
+            file_edits::require_toml(&text, &edits, &self.sources)?;
+        }
         let base = |base: &str| file_edits::base_text(files, &path, base);
         let text = file_edits::edited(&text, &edits, &self.registry().effects(), &base)
             .map_err(|(edit, message)| edit.problem(&self.sources, &message, &path))?;

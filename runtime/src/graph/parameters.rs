@@ -559,6 +559,22 @@ mod tests {
     /// A source that does not declare its file as TOML, and one that does.
     const BOTH: Registry = Registry::new(&[source("other", &AS_PROGRAM), Registration::of::<Source>()]);
 
+    #[test]
+    fn a_value_for_a_command_in_a_file_that_is_not_toml_is_refused() {
+        let viewer = "[process.viewer]\ncommand = [\"viewer\"]\nconfiguration = \"/flight/a.txt\"\n";
+        let text = format!("[run]\nduration_s = 1.0\n{viewer}");
+        let set = ["process.viewer.configuration.gain=2".to_owned()];
+        let manifest = Manifest::parse(text, "/flight/m.toml".as_ref(), &set, BOTH).unwrap();
+        let edited = |content: &str| {
+            let files = InputFiles::default();
+            files.keep("/flight/a.txt".as_ref(), content.into());
+            manifest.with_edits(&files, "viewer", "configuration", "/flight/a.txt".into())
+        };
+        assert_eq!(edited("gain = 1").unwrap(), PathBuf::from("/flight/a@viewer.txt"));
+        let error = edited("GAIN 1").unwrap_err().to_string();
+        assert!(error.contains("of process `viewer`: expected TOML, but the file is not TOML"), "{error}");
+    }
+
     /// A source whose file is data.
     const OF_DATA: Registry = Registry::new(&[source("recorded", &AS_DATA)]);
 

@@ -94,6 +94,17 @@ pub fn all(sources: &Sources, content: &Content) -> Result<Vec<FileEdit>, Diagno
     edits.map(require).collect()
 }
 
+/// Refuses `edits` of a file with this `text` if it is not TOML, for a process whose component does not report that.
+///
+/// # Errors
+/// The first edit, and what to do.
+pub fn require_toml(text: &str, edits: &[&FileEdit], sources: &Sources) -> Result<(), Diagnostic> {
+    match (text.parse::<DocumentMut>(), edits.first()) {
+        (Err(_), Some(edit)) => Err(edit.not_toml(sources, "the file is not TOML")),
+        _ => Ok(()),
+    }
+}
+
 /// `text` with `edits`, which may name these `effects`; `base` returns the text of the file that it is based on, by the path
 /// written in it.
 ///
@@ -196,15 +207,18 @@ impl FileEdit {
         if parameters.iter().find(|parameter| parameter.name == self.file).is_none_or(is_toml) {
             return Ok(());
         }
+        let why =
+            format!("the kind `{kind}` does not declare it as TOML, with #[parameter(file = …)] in Rust");
+        Err(self.not_toml(sources, &why))
+    }
+
+    /// The problem of this edit of a file that is not TOML; `why` says so.
+    fn not_toml(&self, sources: &Sources, why: &str) -> Diagnostic {
         let (name, file) = (&self.process, &self.file);
-        let message = format!(
-            "cannot set a value in the {file} file of process `{name}`: expected TOML, but the kind `{kind}` does not declare it as TOML"
-        );
-        let help = format!(
-            "change a copy of the file, and name it: --set process.{name}.{file}=COPY; a component in Rust declares a file of TOML with \
-             #[parameter(file = …)]"
-        );
-        Err(sources.problem(&self.span, message, help))
+        let message =
+            format!("cannot set a value in the {file} file of process `{name}`: expected TOML, but {why}");
+        let help = format!("change a copy of the file, and name it: --set process.{name}.{file}=COPY");
+        sources.problem(&self.span, message, help)
     }
 
     /// Takes the table of the edited key over from the base: a file states a table whole, or not at all.
