@@ -55,9 +55,10 @@ class Controller(hb.Component):
         wrench[0], wrench[1], wrench[2], wrench[3] = thrust, *torque
         stated[0], stated[1], stated[2] = torque
         offset, least, most = self.offset, self.least, self.most
-        squares = self.mix.dot(wrench).tolist()
-        limited = [least if square < least else most if square > most else square for square in squares]
-        hb.set_values(command["command"], [math.sqrt(square) + offset for square in limited])
+        sent = command["command"]
+        sent["count"], values = 4, sent["values"]
+        for rotor, square in enumerate(self.mix.dot(wrench).tolist()):
+            values[rotor] = math.sqrt(least if square < least else most if square > most else square) + offset
 
 
 if __name__ == "__main__":

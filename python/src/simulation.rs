@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 use std::path::Path;
 
-/// Ticks after which Python may end a step by a signal: some milliseconds.
+/// Ticks after which Python may end a step by a signal, and run its other threads: some milliseconds.
 const TICKS_BETWEEN_SIGNALS: u32 = 1000;
 
 /// A simulation; `hummingbus/_simulations.py` has what people use.
@@ -57,6 +57,10 @@ impl Simulation {
             (0..some).try_for_each(|_| simulation.step_given(&*actions)).map_err(raised)?;
             py.check_signals()?;
             left -= some;
+            if left > 0 {
+                // Other threads of the program go on here, as between two ticks of a node.
+                py.detach(|| {});
+            }
         }
         Ok(())
     }

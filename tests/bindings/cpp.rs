@@ -105,6 +105,19 @@ fn a_checkpoint_holds_the_state_of_a_controller_in_cpp() {
 }
 
 #[test]
+fn a_program_in_c_is_in_the_profile() {
+    let place = Place::new();
+    let manifest = hover(&place, &pilot("pilot", "parameters = { altitude_m = 1.25, name = \"up\" }\n"));
+    let recording = place.path("flight.mcap");
+    let ended =
+        place.call(&["run", &manifest, "--record", &recording, "--set", "run.profile=true", "--json"]);
+    let summary = ended.json();
+    let nodes = summary["profile"]["nodes"].as_array().unwrap();
+    let pilot = nodes.iter().find(|node| node["name"] == "pilot").unwrap();
+    assert_eq!(pilot["compute"]["count"], 300, "{ended}");
+}
+
+#[test]
 fn a_pilot_in_c_sends_what_the_controller_reads() {
     let place = Place::new();
     let manifest = hover(&place, &pilot("pilot", "parameters = { altitude_m = 1.25, name = \"up\" }\n"));

@@ -288,6 +288,62 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
 }
 
 #[test]
+fn a_step_that_blocks_is_ended_by_the_watchdog_with_its_tick() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let code = "\
+import time
+def step(tick, state, set_point):
+    if tick == 100: time.sleep(1000)
+hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})
+";
+    // The interpreter has to join within this time, too.
+    let manifest = hover(&place, code, "watchdog_ms_host = 10000\n");
+    let words = ["`pilot` was killed by the watchdog", "tick 100 is not completed by `pilot`"];
+    fly(python, &place, &manifest).with_code(2).says(&words);
+}
+
+#[test]
+fn a_node_in_python_is_in_the_profile() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let manifest = shipped(&place, "python-controller.toml");
+    let set = ["--set", "run.duration_s=0.3", "--set", "run.profile=true", "--json"];
+    let ended = python
+        .call(&place, &[&["run", &manifest, "--record", &place.path("flight.mcap")], &set[..]].concat());
+    let summary = ended.json();
+    let nodes = summary["profile"]["nodes"].as_array().unwrap();
+    let controller = nodes.iter().find(|node| node["name"] == "controller").unwrap();
+    assert_eq!(controller["compute"]["count"], 300, "{ended}");
+}
+
+#[test]
+fn ctrl_c_ends_a_long_step_and_a_run_and_other_threads_go_on() {
+    let Some(python) = python() else { return };
+    python.eval(
+        "import hummingbus as hb, os, signal, threading\n\
+         # Programs in the background of a script ignore it.\n\
+         signal.signal(signal.SIGINT, signal.default_int_handler)\n\
+         def interrupt(call):\n\
+         \x20   try:\n\
+         \x20       threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()\n\
+         \x20       call()\n\
+         \x20   except KeyboardInterrupt: return\n\
+         \x20   raise AssertionError('nothing ended it')\n\
+         simulation = hb.Simulation('manifests/hover.toml')\n\
+         interrupt(lambda: simulation.step(2_000_000))\n\
+         tick = simulation.tick\n\
+         simulation.step(10)\n\
+         assert tick < 2_000_000 and simulation.tick == tick + 10, tick\n\
+         run = hb.start('manifests/hover.toml', pace='realtime', set={'run.duration_s': 600.0})\n\
+         def wait():\n\
+         \x20   with run: run.wait()\n\
+         interrupt(wait)\n\
+         assert run._process.poll() is not None, 'the run goes on'",
+    );
+}
+
+#[test]
 fn the_columns_of_a_recording_are_what_cat_prints() {
     let Some(python) = python() else { return };
     let place = Place::new();
