@@ -436,6 +436,23 @@ fn an_identification_returns_the_report_of_a_flight_that_python_has_flown() {
 }
 
 #[test]
+fn the_stubs_have_the_names_of_the_library() {
+    let Some(python) = python() else { return };
+    python.eval(
+        "import ast\nfrom hummingbus import _native\n\
+         def names(body):\n\
+         \x20   found = {n.target.id if isinstance(n, ast.AnnAssign) else n.name: n for n in body if not isinstance(n, (ast.ImportFrom, ast.Expr))}\n\
+         \x20   return {name: node for name, node in found.items() if not name.startswith('__')}\n\
+         public = lambda of: {name for name in vars(of) if not name.startswith('__')}\n\
+         stubs = names(ast.parse(open('python/hummingbus/_native.pyi').read()).body)\n\
+         assert public(_native) == set(stubs), public(_native) ^ set(stubs)\n\
+         for name in ('Node', 'Recording', 'Saved', 'Simulation'):\n\
+         \x20   stub, found = set(names(stubs[name].body)), public(getattr(_native, name))\n\
+         \x20   assert stub == found, (name, stub ^ found)",
+    );
+}
+
+#[test]
 fn a_run_that_fails_raises_its_own_words() {
     let Some(python) = python() else { return };
     let said = python.eval(
