@@ -298,7 +298,7 @@ def step(tick, state, set_point):
 hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})
 ";
     // The interpreter has to join within this time, too.
-    let manifest = hover(&place, code, "watchdog_ms_host = 10000\n");
+    let manifest = hover(&place, code, "watchdog_ms_host = 15000\n");
     let words = ["`pilot` was killed by the watchdog", "tick 100 is not completed by `pilot`"];
     fly(python, &place, &manifest).with_code(2).says(&words);
 }
