@@ -99,6 +99,7 @@ fn a_browser_draws_the_page_without_a_network() {
     let buttons = json!(["Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"]);
     assert_eq!(first["buttons"], buttons);
     assert_eq!(first["overflow"], 0, "the page is wider than the window");
+    assert_eq!(seen["narrow"], json!({ "cut": [], "overflow": 0 }), "on a phone");
 
     // The same check must notice a page that needs the network.
     let text = fs::read_to_string(&flight.page).unwrap();

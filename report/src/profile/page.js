@@ -48,16 +48,16 @@ function drawTimeline(slow) {
     name: "critical path", mode: "lines", line: { color: PATH_COLOUR, width: 3 }, hoverinfo: "skip",
     x: slow.path.flatMap(({ start, end }) => [start, end]), y: slow.path.flatMap(({ node }) => [node, node]),
   };
-  plotAt("timeline", [...bars, line], layout("", `µs from the start of the critical path of tick ${slow.tick}`, "", {
-    barmode: "overlay", bargap: 0.35, height: 130 + 44 * nodes.length,
+  plotAt("timeline", [...bars, line], layout(`Tick ${slow.tick}`, "µs from the start of its critical path", "", {
+    barmode: "overlay", bargap: 0.35, height: 100 + 44 * nodes.length,
     xaxis: { separatethousands: true }, yaxis: { categoryorder: "array", categoryarray: [...nodes].reverse(), fixedrange: true },
-    showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
   }), CONFIG);
   fillTable("stretches", [left("on the critical path"), "from [µs]", "for [µs]"],
     slow.path.map(({ place, start, end }) => [left(place), microseconds(start), microseconds(end - start)]));
 }
 
 function drawSlowest() {
+  addLegend("timeline-legend", [...data.parts.map((part) => [COLOURS[part], part]), [PATH_COLOUR, "critical path"]]);
   offer("tick", data.slowest.map((slow) => `${slow.tick}: ${microseconds(slow.length_us)} µs`));
   element("tick").addEventListener("change", () => drawTimeline(data.slowest[element("tick").value]));
   if (data.slowest.length) drawTimeline(data.slowest[0]);
