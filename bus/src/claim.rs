@@ -34,6 +34,12 @@ fn claim_path(run_dir: &Path, name: &str) -> PathBuf {
     run_dir.join(format!("{}.claim", name.replace('/', ".")))
 }
 
+/// True if the process has connected to the run: generation `generation` of node `node`.
+#[must_use]
+pub fn is_made(run_dir: &Path, node: &str, generation: u32) -> bool {
+    claim_path(run_dir, &process_name(node, generation)).exists()
+}
+
 /// Removes the claim of a process that has left: generation `generation` of node `node`.
 pub fn remove(run_dir: &Path, node: &str, generation: u32) {
     // A process that never joined has none.

@@ -16,6 +16,7 @@ mod standstill;
 pub mod state_machine;
 mod straggler;
 
+use crate::ctl::protocol::Request;
 use crate::event::{Progress, RunEvent, StopToken};
 use crate::graph::Graph;
 use crate::processes::{Process, Processes};
@@ -67,6 +68,8 @@ pub struct Supervisor<'a, W: World> {
     spent: Vec<Spent>,
     /// Swaps that were requested and have not ended: the request, the warnings of its backup, and the place of its answer.
     swaps: Vec<(u32, Vec<String>, W::Reply)>,
+    /// Swaps that were requested before the run flies.
+    early: Vec<(Request, W::Reply)>,
     requests: u32,
     stop: &'a StopToken,
     stops_seen: usize,
@@ -116,6 +119,7 @@ impl<'a, W: World> Supervisor<'a, W> {
             world,
             spent: vec![Spent::default(); plan.nodes.len()],
             swaps: Vec::new(),
+            early: Vec::new(),
             requests: 0,
             stop,
             stops_seen: 0,

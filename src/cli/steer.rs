@@ -8,9 +8,16 @@ use inputs::InputFiles;
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request, State};
 use runtime::manifest::PaceSetting;
-use runtime::run_dir::find_own;
+use runtime::run_dir::{LiveRun, find_own};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// Longest time that a swap waits for a run to be alive.
+const ALIVE: Duration = Duration::from_secs(10);
+/// Time after which a swap says that it waits for its backup.
+const SILENCE: Duration = Duration::from_secs(1);
 
 /// The arguments of `hummingbus ctl`.
 #[derive(Args)]
@@ -154,22 +161,60 @@ pub fn swap(arguments: &SwapArguments) -> Result<bool> {
         at_tick: arguments.at_tick,
     };
     let run_id = arguments.run.as_deref();
-    tell_of_pause(run_id);
-    ask(run_id, &request, arguments.json).map(|()| true)
+    let run = awaited_run(run_id)?;
+    tell_of_wait(&run, run_id);
+    let answer = if arguments.json {
+        client::ask(&run, &request)?
+    } else {
+        ask_for_swap(&run, &request, &arguments.process)?
+    };
+    show(&run, run_id, answer, arguments.json).map(|()| true)
 }
 
-/// Says at once that a swap of a paused run waits until the run goes on. Other states and errors are left to the answer.
-fn tell_of_pause(run_id: Option<&str>) {
-    let Ok(run) = find_own(run_id) else { return };
-    if let Ok(Answer::Status(status)) = client::ask(&run, &Request::Status)
-        && status.state == State::Paused
-    {
-        let named = run_id.map_or(String::new(), |run_id| format!(" --run {run_id}"));
-        output::say(&format!(
-            "the run is paused at tick {}, and the swap waits until it goes on: `hummingbus ctl resume{named}`",
-            status.tick
-        ));
+/// The run that a swap asks. If no run is alive, it waits for one that is about to start.
+fn awaited_run(run_id: Option<&str>) -> Result<LiveRun> {
+    if run_id.is_none() && !client::is_any_alive() {
+        output::say(&format!("no run is alive yet: the swap waits for one ({} s at most)", ALIVE.as_secs()));
+        client::await_any(ALIVE);
     }
+    Ok(find_own(run_id)?)
+}
+
+/// Says at once that a swap waits until the run starts or goes on. Other states and errors are left to the answer.
+fn tell_of_wait(run: &LiveRun, run_id: Option<&str>) {
+    let Ok(Answer::Status(status)) = client::ask(run, &Request::Status) else { return };
+    match status.state {
+        State::Starting => output::say("the run is still starting, and the swap waits until it flies"),
+        State::Paused => {
+            let named = run_id.map_or(String::new(), |run_id| format!(" --run {run_id}"));
+            output::say(&format!(
+                "the run is paused at tick {}, and the swap waits until it goes on: `hummingbus ctl resume{named}`",
+                status.tick
+            ));
+        }
+        _ => {}
+    }
+}
+
+/// Asks `run` for a swap of `process`. A line on standard error says if its program has not connected after a second.
+fn ask_for_swap(run: &LiveRun, request: &Request, process: &str) -> Result<Answer> {
+    let (asking, answered) = channel::<()>();
+    let answer = std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let mut is_told = false;
+            while !is_told && answered.recv_timeout(SILENCE) == Err(RecvTimeoutError::Timeout) {
+                let awaited = client::awaited_backup(run, process);
+                is_told = awaited.is_some();
+                if let Some(backup) = awaited {
+                    output::say(&format!("waiting for {backup}"));
+                }
+            }
+        });
+        let answer = client::ask(run, request);
+        drop(asking);
+        answer
+    });
+    Ok(answer?)
 }
 
 /// The TOML text that `given` is, or that the file of this name holds.
@@ -190,6 +235,11 @@ pub fn description(given: &str) -> Result<String> {
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
     let run = find_own(run_id)?;
     let answer = client::ask(&run, request)?;
+    show(&run, run_id, answer, json)
+}
+
+/// Prints the `answer` of `run`, which the user named `run_id`.
+fn show(run: &LiveRun, run_id: Option<&str>, answer: Answer, json: bool) -> Result<()> {
     if json {
         let mut told = serde_json::to_value(&answer)?;
         // Of the files of the run, not of its answer: older runs are asked, too.

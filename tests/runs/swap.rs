@@ -164,6 +164,42 @@ fn a_process_of_a_live_run_is_swapped() {
     assert!(messages(&recording) == messages(&undisturbed(&place)), "the flights differ");
 }
 
+/// The controller of a run that starts slowly connects once the file `go` is there.
+#[test]
+fn a_swap_of_a_run_that_is_still_starting_waits_until_it_flies() {
+    let place = Place::new();
+    let example = Path::new(env!("CARGO_BIN_EXE_hummingbus")).with_file_name("examples/custom_controller");
+    let go = place.path("go");
+    let script = format!("until [ -e '{go}' ]; do sleep 0.02; done; exec '{}'", example.display());
+    let command = format!("process.controller.command=[\"sh\", \"-c\", {script:?}]");
+    let (manifest, recording) = (repository("manifests/custom-controller.toml"), place.path("live.mcap"));
+    let launch = place.start_endless(&["run", &manifest, "--record", &recording, "--set", &command]);
+    place.process_of("controller");
+    let run = place.run_id();
+    let swap = place.start(&["swap", "imu", "--shadow-ticks", "20", "--run", &run]);
+    swap.await_said("the run is still starting, and the swap waits until it flies");
+    fs::write(go, "").unwrap();
+    swap.end_among_others().with_code(0).prints(&["`imu.1` flies from tick", "handed over: state"]);
+    place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
+    launch.end().with_code(1);
+}
+
+#[test]
+fn a_swap_to_a_program_that_never_joins_says_that_it_waits() {
+    let place = Place::new();
+    let (hover, recording) = (repository("manifests/hover.toml"), place.path("live.mcap"));
+    let mut launch = place.start_endless(&["run", &hover, "--record", &recording]);
+    launch.await_ticks(1);
+    let run = place.run_id();
+    let with = "command = [\"sleep\", \"600\"]\nwatchdog_ms_host = 600_000";
+    let swap = place.start(&["swap", "controller", "--with", with, "--run", &run]);
+    swap.await_said("waiting for `controller.1` to join (20 s at most, or its `watchdog_ms_host`)");
+    place.start(&["ctl", "stop", "--run", &run]).end_among_others().with_code(0);
+    let refused = swap.end_among_others().with_code(2);
+    refused.says(&["the run ended before `controller.1` could join"]);
+    launch.end().with_code(1);
+}
+
 /// A swap of the plant of `base` with this line; returns the end of the run and its recording.
 fn swap_plant(place: &Place, base: &str, with: &str) -> (Ended, String) {
     let swap = format!("[[swap]]\nprocess = \"plant\"\nat_tick = 700\nshadow_ticks = 50\n{with}\n");

@@ -3,17 +3,56 @@
 
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::{is_own_user, socket_path};
-use crate::run_dir::LiveRun;
+use crate::program::WATCHDOG;
+use crate::run_dir::{LiveRun, live_runs};
 use anyhow::{Context, anyhow, bail};
+use bus::plan::Plan;
 use bus::user_file;
 use diagnostics::Error;
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Longest time from the registration of a run to its socket.
 const START: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
+
+/// True if a run of this user is alive.
+#[must_use]
+pub fn is_any_alive() -> bool {
+    !live_runs().is_empty()
+}
+
+/// Waits until a run of this user is alive, at most `patience`.
+pub fn await_any(patience: Duration) {
+    let start = Instant::now();
+    while !is_any_alive() && start.elapsed() < patience {
+        std::thread::sleep(POLL);
+    }
+}
+
+/// The backup of `process` on which a swap of `run` waits, with the time that it has. None if its program has connected to the run.
+#[must_use]
+pub fn awaited_backup(run: &LiveRun, process: &str) -> Option<String> {
+    let run_dir = &run.entry.run_dir;
+    let plan = Plan::load(run_dir).ok()?;
+    let node = plan.nodes.iter().position(|node| node.name == process)?;
+    let generation = newest_backup(run_dir, node)?;
+    let named = format!(
+        "`{process}.{generation}` to join ({} s at most, or its `watchdog_ms_host`)",
+        WATCHDOG.as_secs()
+    );
+    (!bus::claim::is_made(run_dir, process, generation)).then_some(named)
+}
+
+/// Generation of the newest backup of `node` that was started, by the plans in `run_dir`.
+fn newest_backup(run_dir: &Path, node: usize) -> Option<u32> {
+    let prefix = format!("node-{node}.");
+    let generation = |name: &str| name.strip_prefix(&prefix)?.strip_suffix(".json")?.parse().ok();
+    let files = std::fs::read_dir(run_dir).ok()?.flatten();
+    files.filter_map(|file| generation(file.file_name().to_str()?)).max()
+}
 
 /// Sends `request` to `run`, and waits for its answer, which may take as long as the action.
 ///
@@ -69,4 +108,19 @@ fn connect(run: &LiveRun) -> std::io::Result<UnixStream> {
 /// `stream`, if this user is at its other end.
 fn of_own_user(stream: UnixStream) -> std::io::Result<UnixStream> {
     if is_own_user(&stream) { Ok(stream) } else { Err(std::io::Error::other("another user answers there")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::newest_backup;
+
+    #[test]
+    fn the_newest_backup_is_the_one_of_the_node_with_the_highest_generation() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["node-1.2.json", "node-1.10.json", "node-11.20.json", "node-1.x.json", "plan.json"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let newest = |node| newest_backup(folder.path(), node);
+        assert_eq!([newest(1), newest(11), newest(2)], [Some(10), Some(20), None]);
+    }
 }

@@ -74,6 +74,14 @@ struct Backup {
     report: Report,
 }
 
+impl Backup {
+    /// Reason of its refusal if the run ended before it could do `what`.
+    fn ended_before(&self, what: &str) -> String {
+        let Report { process, generation, .. } = &self.report;
+        format!("the run ended before `{process}.{generation}` could {what}")
+    }
+}
+
 /// A node's processes.
 #[derive(Debug)]
 struct Node {
@@ -345,7 +353,7 @@ impl<'a> Replacements<'a> {
             if backup.stage == Stage::Joining {
                 self.withdraw(node, backup.stage);
             }
-            backup.report.refused = Some("the run ended before it could join".to_owned());
+            backup.report.refused = Some(backup.ended_before("join"));
             self.reports.push(backup.report);
         }
     }
@@ -354,7 +362,7 @@ impl<'a> Replacements<'a> {
     pub(crate) fn into_reports(mut self) -> Vec<Report> {
         for mut backup in self.nodes.into_iter().filter_map(|nodes| nodes.backup) {
             if backup.report.purpose == Purpose::Swap && backup.report.take_over_tick.is_none() {
-                backup.report.refused = Some("the run ended before it could take over".to_owned());
+                backup.report.refused = Some(backup.ended_before("take over"));
             }
             self.reports.push(backup.report);
         }

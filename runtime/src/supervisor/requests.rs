@@ -72,10 +72,18 @@ fn refusal(error: &anyhow::Error) -> Answer {
 }
 
 impl<W: World> Supervisor<'_, W> {
-    /// Serves the requests to the run, and answers swaps that have ended.
+    /// Serves the requests to the run, and answers swaps that have ended. A swap waits until the run flies.
     pub(super) fn serve_requests(&mut self) {
+        let mut asked = std::mem::take(&mut self.early);
         for _ in 0..MAX_SWAPS_A_LOOK {
-            let Some((request, reply)) = self.world.next_request() else { break };
+            let Some(request) = self.world.next_request() else { break };
+            asked.push(request);
+        }
+        if matches!(self.decisions.state, State::Starting | State::Gathering) {
+            self.early = asked;
+            return;
+        }
+        for (request, reply) in asked {
             let Request::Swap { process, with, shadow_ticks, at_tick } = request else { continue };
             match self.request_swap(&process, &with, shadow_ticks, at_tick) {
                 Ok((request, warnings)) => self.swaps.push((request, warnings, reply)),
@@ -99,11 +107,11 @@ impl<W: World> Supervisor<'_, W> {
         shadow_ticks: Option<u32>,
         at_tick: Option<u32>,
     ) -> Result<(u32, Vec<String>)> {
+        if self.decisions.state != State::Running {
+            bail!("the run is ending: `{process}` cannot be swapped any more");
+        }
         let (backup, warnings) = self.world.backup_of(process, with)?;
         self.require_claimed_log(&backup)?;
-        if self.decisions.state != State::Running {
-            bail!("the run does not fly: `{process}` cannot be swapped now");
-        }
         if self.decisions.replacements.is_busy(backup.node) {
             bail!("`{process}` has a backup, a standby or a shadow already; one at a time");
         }
