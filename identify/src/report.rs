@@ -1,6 +1,6 @@
 //! Results of an identification, for programs (`report.json`) and for people.
 
-use crate::align::Offsets;
+use crate::align::{Offset, Offsets};
 use crate::candidate::Unidentifiable;
 use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
@@ -14,6 +14,7 @@ use crate::trim::Trim;
 use crate::whiteness::Whiteness;
 use crate::worth::{Worth, in_words};
 use diagnostics::unit::behind_number;
+use flights::Role;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -98,7 +99,7 @@ pub struct FlightReport {
     /// Its name.
     pub name: String,
     /// `fit`, `select` or `test`.
-    pub role: flights::Role,
+    pub role: Role,
     /// Length of the compared part, in s.
     pub compared_s: f64,
     /// Width of the windows in which measurement and model are compared, in s.
@@ -218,6 +219,15 @@ impl FlightWind {
     }
 }
 
+/// A clock's offset and its correction.
+fn clock_in_words(offset: Offset) -> String {
+    let Offset { value, taken_off, .. } = offset;
+    let [size_ms, moved_ms] = [value, taken_off].map(|time_s| rounded(1e3 * time_s.abs()));
+    let late = if value < 0.0 { "early" } else { "late" };
+    let moved = if taken_off < 0.0 { "added to" } else { "taken off" };
+    format!("{size_ms} ms {late}; {moved_ms} ms were {moved} its times")
+}
+
 impl Report {
     /// The effects of the verdict, and those that are kept for predictions.
     fn accepted(&self) -> impl Iterator<Item = &&'static str> {
@@ -314,8 +324,7 @@ impl Report {
             }
             for (channel, offset) in offsets {
                 let Some(offset) = offset.filter(|offset| offset.taken_off != 0.0) else { continue };
-                let [late_ms, off_ms] = [offset.value, offset.taken_off].map(|time_s| rounded(1e3 * time_s));
-                writeln!(f, "clock: {channel} of {flight} is {late_ms} ms late; {off_ms} ms were taken off")?;
+                writeln!(f, "clock: {channel} of {flight} is {}", clock_in_words(offset))?;
             }
         }
         Ok(())
@@ -377,11 +386,7 @@ impl Report {
         }
         for name in self.accepted() {
             let Some(effect) = self.effects.get(name) else { continue };
-            let [without, with] = [effect.held_out.before, effect.held_out.after].map(rounded);
-            writeln!(
-                f,
-                "  {name}: normalised residual on held-out data {without} without it, {with} with all effects"
-            )?;
+            writeln!(f, "  {name}: {}", self.residuals_in_words(effect))?;
             for (parameter, estimate) in &effect.parameters {
                 let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(rounded);
                 let doubt = match estimate {
@@ -400,7 +405,11 @@ impl Report {
                 }
             }
             if let Some(worth) = in_words(&effect.worth) {
-                writeln!(f, "    prediction errors without it -> with it, {worth}")?;
+                let role = self.judged_role().name();
+                writeln!(
+                    f,
+                    "    prediction errors on the {role} flights, without it (the others fitted to that) -> with it, {worth}"
+                )?;
             }
             if !effect.confused_with.is_empty() {
                 writeln!(f, "    cannot be told from: {}", effect.confused_with.join(", "))?;
@@ -420,6 +429,25 @@ impl Report {
             let Fault { flight, channel, kind, consequence, advice, .. } = fault;
             writeln!(f, "fault: {flight}: {channel} ({kind}): {}; {consequence}; {advice}", fault.finding())
         })
+    }
+
+    /// Role of the flights on which effects are chosen.
+    fn judged_role(&self) -> Role {
+        let has_own = self.flights.iter().any(|flight| flight.role == Role::Select);
+        if has_own { Role::Select } else { Role::Fit }
+    }
+
+    /// Residuals without and with an effect. They are those of the equations, also where predictions refined the parameters.
+    fn residuals_in_words(&self, effect: &EffectReport) -> String {
+        let BeforeAfter { before, after } = effect.held_out;
+        let by = if self.refined { ", by the equations before the refinement:" } else { "" };
+        let why = if after > before && !effect.worth.is_empty() {
+            "; it is kept for the prediction errors below"
+        } else {
+            ""
+        };
+        let [without, with] = [before, after].map(rounded);
+        format!("normalised residual on held-out data{by} {without} without it, {with} with all effects{why}")
     }
 
     /// The answer where predictions lose: no verdict, but advice what to measure.
@@ -646,9 +674,8 @@ mod tests {
         assert!(!Report::of_nothing().to_string().contains("wind"));
     }
 
-    /// An estimate stands at a limit of what is plausible also where the equations ask for hardly more.
-    #[test]
-    fn an_estimate_at_its_bound_is_told_as_what_it_is() {
+    /// An accepted effect whose estimate is at its bound.
+    fn effect() -> EffectReport {
         let estimate = Estimate {
             value: 0.1,
             unit: "kg/m",
@@ -658,7 +685,7 @@ mod tests {
             determined: true,
             by_equations: None,
         };
-        let effect = EffectReport {
+        EffectReport {
             accepted: true,
             linearised: false,
             parameters: BTreeMap::from([("coefficient_z", estimate)]),
@@ -667,8 +694,44 @@ mod tests {
             worth: Vec::new(),
             confused_with: Vec::new(),
             experiment: None,
+        }
+    }
+
+    #[test]
+    fn residuals_and_prediction_errors_name_their_flights_and_models() {
+        let worth = Worth { channel: "attitude", horizon_s: 0.5, without: 6.749, with: 0.3738, unit: "deg" };
+        let held_out = BeforeAfter { before: 1.053, after: 3.227 };
+        let mut report = Report {
+            verdict: vec!["parasitic-drag"],
+            effects: BTreeMap::from([(
+                "parasitic-drag",
+                EffectReport { held_out, worth: vec![worth], ..effect() },
+            )]),
+            ..Report::of_nothing()
         };
-        let effects = BTreeMap::from([("parasitic-drag", effect)]);
+        let text = report.to_string();
+        let errors = "prediction errors on the fit flights, without it (the others fitted to that) -> with it, after 0.5 s: \
+                      attitude 6.749 -> 0.3738 deg\n";
+        assert!(text.contains(errors), "{text}");
+        let residual = "held-out data 1.053 without it, 3.227 with all effects; it is kept for the prediction errors below\n";
+        assert!(text.contains(residual), "{text}");
+        report.refined = true;
+        let text = report.to_string();
+        let refined = "held-out data, by the equations before the refinement: 1.053 without it, 3.227 with";
+        assert!(text.contains(refined), "{text}");
+    }
+
+    #[test]
+    fn a_clock_that_is_early_is_not_late_by_a_negative_time() {
+        let offset = |value: f64| Offset { value, low: value, high: value, taken_off: value };
+        assert_eq!(clock_in_words(offset(-0.01264)), "12.64 ms early; 12.64 ms were added to its times");
+        assert_eq!(clock_in_words(offset(0.01264)), "12.64 ms late; 12.64 ms were taken off its times");
+    }
+
+    /// An estimate stands at a limit of what is plausible also where the equations ask for hardly more.
+    #[test]
+    fn an_estimate_at_its_bound_is_told_as_what_it_is() {
+        let effects = BTreeMap::from([("parasitic-drag", effect())]);
         let text = Report { verdict: vec!["parasitic-drag"], effects, ..Report::of_nothing() }.to_string();
         assert!(text.contains("0.1100); at its bound: another cause may be at work\n"), "{text}");
         assert!(!text.contains("more is asked"), "{text}");

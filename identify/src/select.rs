@@ -219,7 +219,8 @@ impl StepwiseSearch {
             if open == 0 {
                 break;
             }
-            progress(&format!("round {}: {open} candidates", self.rounds.len() + 1));
+            let round = self.rounds.len() + 1;
+            progress(&format!("round {round} (ends when nothing changes): {open} candidates"));
             problem.weigh(&self.base, candidates);
             self.base = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
             self.rounds.push(round(problem, &self.base, &self.accepted, candidates, FALSE_RATE));

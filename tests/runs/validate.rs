@@ -131,6 +131,11 @@ fn notes_of_the_reader_and_faults_stand_below_the_table() {
     let json = place.call(&[&args[..], &["--json"]].concat()).with_code(0).json();
     let notes = json["flights"]["course"]["notes"].as_array().unwrap_or_else(|| panic!("{json:#}"));
     assert!(notes.iter().any(|note| note.as_str().unwrap().contains("command.1+3 (swapped)")), "{json:#}");
+    // The sum over one step is the error after it.
+    for (steps, has_sum) in [("1", false), ("5", true)] {
+        let table = place.call(&["validate", &vehicle_file, &flights, "--steps-ahead", steps]).with_code(0);
+        assert_eq!(table.output.contains(" sum "), has_sum, "{table}");
+    }
     let sound = place
         .call(&["validate", &vehicle_file, &flights, "--steps-ahead", "5", "--json"])
         .with_code(0)

@@ -114,7 +114,7 @@ impl StepsAheadErrors {
     }
 }
 
-/// For each quantity a row after the first sample, after a fifth of them and after all, and one with the sum over all.
+/// For each quantity a row after the first sample, after a fifth of them and after all, and one with the sum over several.
 fn rows(flight: &FlightSteps) -> Vec<Vec<String>> {
     let (first, steps) = (&flight.errors[0], flight.errors[0].model.len());
     let mut shown = vec![1, steps.div_ceil(5), steps];
@@ -132,8 +132,8 @@ fn rows(flight: &FlightSteps) -> Vec<Vec<String>> {
         let at = shown.iter().map(|step| {
             row(*quantity, format!("{:.3} s", *step as f64 * first.period_s), &|errors| errors[step - 1])
         });
-        let sum = row(*quantity, "sum".to_owned(), &|errors| errors.iter().sum());
-        at.chain([sum]).collect::<Vec<_>>()
+        let sum = (steps > 1).then(|| row(*quantity, "sum".to_owned(), &|errors| errors.iter().sum()));
+        at.chain(sum).collect::<Vec<_>>()
     };
     flight.quantities.iter().flat_map(of_quantity).collect()
 }
