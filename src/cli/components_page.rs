@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 const HEAD: &str = "# Components
 This page is the reference of the kinds that a process of a manifest can have (`kind = \"imu\"`): inputs, outputs, parameters and an example of each. The
 components declare it themselves: `hummingbus components >docs/components.md` writes the page, `hummingbus components imu` prints a part of it in the
-terminal, and `hummingbus schema` prints the fields of the messages.
+terminal, and `hummingbus schema` prints the fields of the messages and of the states.
 
 - An input or output in brackets may be left out. The topics in the examples are those of processes that are named like their kinds.
 - A parameter whose default is *required* has to be given. Lists of numbers are along x, y, z of the axes that the meaning names.

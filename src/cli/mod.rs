@@ -113,8 +113,8 @@ commands! {
     /// Make a project folder that flies, or a first vehicle file from a model in URDF or SDF.
     #[command(after_help = new::HELP)]
     New(new::NewArguments) => new::new;
-    /// Print every message's fields, units, frames and layout hash.
-    #[command(after_help = "Example: hummingbus schema --json")]
+    /// Print every message and every state that a component hands over: fields, units, frames and layout hash.
+    #[command(after_help = "Example: hummingbus schema PlantState")]
     Schema(schema::SchemaArguments) => schema::schema;
     /// Print every component: its ports, its parameters, the state that it hands over.
     #[command(after_help = "Example: hummingbus components --json")]

@@ -159,6 +159,26 @@ fn schema_prints_the_same_as_json() {
 }
 
 #[test]
+fn schema_prints_the_states_that_components_hand_over() {
+    let place = Place::new();
+    let state = place.call(&["schema", "ControllerState"]).with_code(0);
+    state.prints(&[
+        "hummingbus_msgs/msg/ControllerState (",
+        "integrals.lift",
+        "Handed over at a swap by ",
+        " pid, ",
+    ]);
+    let all = place.call(&["schema"]).with_code(0);
+    all.prints(&[state.output.as_str()]);
+    let of = |name: &str| place.call(&["schema", name, "--json"]).with_code(0).json()[0]["state_of"].clone();
+    assert!(of("ControllerState").as_array().unwrap().contains(&"pid".into()));
+    assert_eq!(of("PlantState"), json!([]));
+    for (option, table) in [("--c", "HbControllerState"), ("--cpp", "struct ControllerState ")] {
+        place.call(&["schema", "ControllerState", option]).with_code(0).prints(&[table]);
+    }
+}
+
+#[test]
 fn cat_prints_one_json_object_a_line() {
     let place = Place::new();
     let recording = recording(&place);
@@ -184,6 +204,7 @@ fn schema_components_and_effects_print_one() {
     let one = place.call(&["schema", "hummingbus_msgs/msg/PlantState", "--json"]).with_code(0).json();
     assert_eq!(one.as_array().map(Vec::len), Some(1));
     place.call(&["schema", "PlantStat"]).with_code(2).says(&["no component", "PlantStat", "PlantState"]);
+    place.call(&["schema", "ControllerStat"]).with_code(2).says(&["a state of type", "`ControllerState`"]);
     let ended = place.call(&["components", "pid"]).with_code(0);
     ended.prints(&[
         "pid: altitude, roll",
