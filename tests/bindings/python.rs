@@ -83,8 +83,13 @@ fn shipped(place: &Place, name: &str) -> String {
     place.write(name, text)
 }
 
-/// A hover of 0.3 s whose pilot is the Python program `code`.
+/// A hover of 0.3 s whose pilot is the Python program `code`, with the vehicle's state as its input `state`.
 fn hover(place: &Place, code: &str, more: &str) -> String {
+    hover_with_input(place, "state", code, more)
+}
+
+/// The same with the vehicle's state as the input `port`.
+fn hover_with_input(place: &Place, port: &str, code: &str, more: &str) -> String {
     let program = place.write("pilot.py", format!("#!/usr/bin/env python3\nimport hummingbus as hb\n{code}"));
     let mut permissions = fs::metadata(&program).unwrap().permissions();
     std::os::unix::fs::PermissionsExt::set_mode(&mut permissions, 0o755);
@@ -96,7 +101,7 @@ fn hover(place: &Place, code: &str, more: &str) -> String {
          [process.controller]\nkind = \"pid\"\nvehicle = {vehicle:?}\n\
          inputs = {{ set_point = \"/pilot/set_point\", estimate = \"/ekf/estimate\" }}\n\
          [process.pilot]\ncommand = [{program:?}]\n\
-         inputs.state = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\
+         inputs.{port} = {{ topic = \"/plant/state\", delay_ticks = 1, initial = {{}} }}\n\
          outputs.set_point = {{ type = \"hummingbus_msgs/msg/SetPoint\" }}\n{more}"
     );
     place.write("hover.toml", text)
@@ -477,24 +482,42 @@ fn the_examples_of_the_page_and_of_the_package_run() {
     let page = fs::read_to_string(repository("docs/python.md")).unwrap();
     let blocks: Vec<&str> =
         page.split("\n```python\n").skip(1).map(|rest| rest.split("\n```").next().unwrap()).collect();
-    assert_eq!(blocks.len(), 6, "docs/python.md");
+    assert_eq!(blocks.len(), 5, "docs/python.md");
     python.eval(&blocks.join("\n"));
     python.eval("import doctest, hummingbus._messages as m\nassert doctest.testmod(m).failed == 0");
     python.eval(
         "import json, hummingbus as hb\nfrom hummingbus import _native\nnames = hb.messages()\nassert len(names) > 30\n\
          for name in names: assert hb.dtype(name).itemsize == json.loads(_native.message(name))['size'], name",
     );
+}
 
-    let node = page
-        .split("\n```python node\nimport hummingbus as hb\n")
-        .nth(1)
-        .unwrap()
-        .split("\n```")
-        .next()
-        .unwrap();
-    let place = Place::new();
-    let ended = fly(python, &place, &hover(&place, node, "parameters = { more_m = 0.25 }\n"));
-    ended.flown();
+/// The nodes of docs/python.md.
+fn nodes_of_the_page() -> Vec<String> {
+    let page = fs::read_to_string(repository("docs/python.md")).unwrap();
+    let blocks = page.split("\n```python node\nimport hummingbus as hb\n").skip(1);
+    blocks.map(|rest| rest.split("\n```").next().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn the_nodes_of_the_page_fly() {
+    let Some(python) = python() else { return };
+    let nodes = nodes_of_the_page();
+    let parameters = ["parameters = { more_m = 0.25 }\n", "parameters = { gain_1_s = 0.5 }\n"];
+    assert_eq!(nodes.len(), parameters.len(), "docs/python.md");
+    for (node, parameters) in nodes.iter().zip(parameters) {
+        let place = Place::new();
+        fly(python, &place, &hover_with_input(&place, "plant", node, parameters)).flown();
+        let Some(gain_1_s) = parameters.contains("gain_1_s").then_some(0.5) else { continue };
+        // The node integrates the error of the state of the tick before, which is zeros at tick 0.
+        python.eval(&format!(
+            "import hummingbus as hb, numpy as np\nr = hb.Recording({:?})\n\
+             z = r.numpy('/plant/state', ['position.z'])['position.z']\n\
+             asked = r.numpy('/pilot/set_point', ['altitude'])['altitude']\n\
+             low = 1.0 - np.concatenate(([0.0], z[:-1]))\n\
+             assert len(asked) == 300 and abs(asked - 1.0 - {gain_1_s} * 0.001 * np.cumsum(low)).max() < 1e-12, asked",
+            place.path("flight.mcap")
+        ));
+    }
 }
 
 #[test]
