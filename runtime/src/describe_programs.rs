@@ -7,7 +7,7 @@ use crate::graph::Graph;
 use crate::host_world::store_files;
 use crate::manifest::Manifest;
 use crate::process_log;
-use crate::program::{HOW_TO_JOIN, Program};
+use crate::program::{HOW_TO_JOIN, Program, advice_on};
 use crate::role::Role;
 use crate::run_dir::shared_memory_of;
 use crate::spawn::{self, start};
@@ -170,7 +170,8 @@ fn answer(
     if let Some(description) = Description::load(run_dir, node, generation)? {
         return Ok(description);
     }
-    let said = process_log::last_words(&started.log).join("\n  ");
+    let words = process_log::last_words(&started.log);
+    let said = words.join("\n  ");
     let fault = match ended {
         Some(status) => format!("it ended with {status}"),
         None => format!("it did not report its ports within {} ms", program.watchdog.as_millis()),
@@ -178,7 +179,9 @@ fn answer(
     let mut help = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
     match ended {
         Some(_) if !said.is_empty() => {
-            "correct the manifest or the program as its output says".clone_into(&mut help)
+            let advice =
+                advice_on(&words).unwrap_or("correct the manifest or the program as its output says");
+            advice.clone_into(&mut help);
         }
         Some(_) => {}
         None => help.push_str("; one that needs longer to start has a longer `watchdog_ms_host`"),

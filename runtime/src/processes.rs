@@ -1,6 +1,7 @@
 //! The processes of a run: watched, and taken down.
 
 use crate::host::{self, End};
+use crate::program::advice_on;
 use crate::role::Role;
 use crate::view::SegmentWrite;
 use crate::watch_clock::WatchClock;
@@ -143,15 +144,17 @@ impl<B: Body> Process<B> {
         }
     }
 
-    /// Description of the end of a process before that of the run, with the last lines that it wrote.
+    /// Description of the end of a process before that of the run, with the last lines that it wrote and advice on them.
     pub fn post_mortem(&self) -> String {
         let end = match (&self.verdict, &self.end) {
             (Some(verdict), _) => verdict.clone(),
             (None, Some(end)) => end.message(),
             (None, None) => "is still running".to_owned(),
         };
-        let lines: String = self.body.last_lines().iter().map(|line| format!("\n  {line}")).collect();
+        let words = self.body.last_lines();
+        let lines: String = words.iter().map(|line| format!("\n  {line}")).collect();
+        let advice = advice_on(&words).map_or_else(String::new, |advice| format!("\n{advice}"));
         let group = self.group.as_ref().map_or(String::new(), |group| format!(" of group `{group}`"));
-        format!("process `{}`{group} {end}{lines}", self.name)
+        format!("process `{}`{group} {end}{lines}{advice}", self.name)
     }
 }

@@ -18,6 +18,15 @@ pub const WATCHDOG: Duration = Duration::from_secs(20);
 pub(crate) const HOW_TO_JOIN: &str = "to join, a program calls `bus::run_process` in Rust, `hummingbus::Node` in C++ or \
                                       `hummingbus.run_node` in Python";
 
+/// Advice on a program in Python, from the `lines` that it wrote last: it could not import `hummingbus`. `None` for any other end.
+pub(crate) fn advice_on(lines: &[String]) -> Option<&'static str> {
+    let module = lines.last()?.strip_prefix("ModuleNotFoundError: No module named 'hummingbus")?;
+    module.starts_with(['\'', '.']).then_some(
+        "hummingbus is not installed in the Python that starts this program: install it there with `pip install`, as \
+         docs/python.md says, or let `command` begin with the Python that has it, such as \"venv/bin/python\"",
+    )
+}
+
 /// An executable behind a node.
 #[derive(Clone, Debug)]
 pub enum Executable {
@@ -221,4 +230,22 @@ pub(crate) fn unsaved<'a>(
             _ => None,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::advice_on;
+
+    #[test]
+    fn only_a_program_without_the_package_gets_advice_on_it() {
+        let advice = |line: &str| advice_on(&["import hummingbus as hb".to_owned(), line.to_owned()]);
+        for module in ["hummingbus", "hummingbus._native"] {
+            let advice = advice(&format!("ModuleNotFoundError: No module named '{module}'"));
+            assert!(advice.is_some_and(|advice| advice.contains("pip install")), "{module}");
+        }
+        for line in ["ModuleNotFoundError: No module named 'hummingbus_tools'", "hummingbus", ""] {
+            assert_eq!(advice(line), None, "{line}");
+        }
+        assert_eq!(advice_on(&[]), None);
+    }
 }

@@ -110,6 +110,21 @@ fn a_program_that_takes_no_part_is_refused_and_none_is_started_where_that_is_ask
 }
 
 #[test]
+fn a_program_in_python_without_the_package_gets_advice_on_it() {
+    let without = "command = [\"sh\", \"-c\", \"echo ModuleNotFoundError: No module named \\\\'hummingbus\\\\' >&2; exit 1\"]\n\
+                   outputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
+    let place = Place::new();
+    let manifest = hover(&place, &pid(), without);
+    for command in ["check", "run"] {
+        place.call(&[command, &manifest]).with_code(2).says(&[
+            "No module named 'hummingbus'",
+            "hummingbus is not installed in the Python that starts this program",
+            "docs/python.md",
+        ]);
+    }
+}
+
+#[test]
 fn a_program_that_hangs_is_refused_as_a_run_would_end_at_its_watchdog() {
     let hanging = "command = [\"sleep\", \"100\"]\nwatchdog_ms_host = 500\n\
                    outputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
