@@ -181,6 +181,7 @@ fn files_that_a_new_project_names_exist_and_no_placeholder_is_left() {
         if language == "python" {
             let controller = fs::read_to_string(format!("{folder}/controller/controller.py")).unwrap();
             assert!(controller.contains("controller/venv/bin/pip install "), "{controller}");
+            assert!(readme.contains("compiles the package with Cargo: it needs Rust"), "{readme}");
             // Its environment is not there yet.
             let ended = place.call(&["check", &format!("{folder}/hover-python.toml")]).with_code(2);
             ended.says(&["venv/bin/python: there is no such file", "README.md", "pip install"]);
