@@ -84,9 +84,9 @@ class Component:
     """A node with ports, and what it computes.
 
     `inputs` and `outputs` are messages by the names of their ports; `state` is the message that holds all that changes from
-    tick to tick: whoever takes the node's place goes on from it, and checkpoints hold it. `step` gets each message under the
-    name of its port: numpy arrays of no dimension in shared memory, valid until it returns. An output is zeros, and `None` where
-    none is due.
+    tick to tick: whoever takes the node's place goes on from it, and checkpoints hold it. `step` gets the number of the run's
+    tick, each message under the name of its port, and the state as `state`: numpy arrays of no dimension in shared memory,
+    valid until it returns. An output is zeros, and `None` where none is due.
 
         class Climb(hummingbus.Component):
             inputs = {"state": "PlantState"}
