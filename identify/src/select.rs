@@ -586,7 +586,8 @@ mod tests {
         let allowed = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&mass), &[]);
         let rounds = vec![Round { judged: vec![taken], taken: Some(0) }];
         let search = StepwiseSearch { accepted, rounds, base };
-        let selection = search.finished(&mut problem, &candidates, &mut |_| ());
+        // Rounds that are offered the mass again may take it, and then no exchange is left to do.
+        let selection = search.finished(&mut problem, &candidates[1..], &mut |_| ());
         let mass = selection.flown().values[mass.free[0]];
         Found { selection, mass, is_allowed: !allowed.is_empty() }
     }
@@ -643,10 +644,10 @@ mod tests {
         require_both(&found_of([-0.1, 0.2]).selection);
     }
 
-    /// It turns by a twentieth faster: too little for the equations, and enough for predictions.
+    /// It turns by a fiftieth faster: too little for the equations, and enough for predictions.
     #[test]
     fn thrust_and_inertia_stay_where_a_mass_predicts_worse() {
-        let Found { selection, is_allowed, .. } = found_of([-0.1, -0.14]);
+        let Found { selection, is_allowed, .. } = found_of([-0.1, -0.12]);
         assert!(is_allowed, "predictions have nothing to decide");
         require_both(&selection);
     }

@@ -481,7 +481,7 @@ mod tests {
         (World::new(&Hull::of(&Airframe::new(vehicle)), &scene, Vec::new()), states)
     }
 
-    /// Where its top overhangs a corner of the table, a triangle of the table's side told of a depth of centimetres.
+    /// The body's top overhangs a corner of the table, where a triangle of the table's side told of a depth of centimetres.
     #[test]
     fn a_body_that_touches_a_mesh_is_not_inside_of_it() {
         let far = RigidBody::level_at(Vector3::z() * 50.0);
