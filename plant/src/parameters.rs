@@ -28,7 +28,7 @@ pub struct Parameters {
     /// Scene file, relative to the manifest.
     #[parameter(shown = "nothing but the ground", file = scenes::FILE)]
     scene: Option<PathBuf>,
-    /// Physics that moves the vehicle: free flight, or the same forces in a scene.
+    /// Physics that moves the vehicle: free flight, without ground or contacts, or the same forces in a scene.
     #[parameter(default = BackendName::default(), shown = "newton-euler", range = "`newton-euler`, `rapier`")]
     backend: BackendName,
     /// Centre of mass at tick 0, in the world.

@@ -15,7 +15,7 @@ use toml::Table;
 use vehicles::Envelope;
 
 /// Message of the topics that hold true states.
-const STATE: &str = "hummingbus_msgs/msg/PlantState";
+pub(crate) const STATE: &str = "hummingbus_msgs/msg/PlantState";
 
 /// A quantity of a flight that left the envelope of its vehicle. Its text is a line of the summary.
 ///

@@ -9,6 +9,7 @@
 //! | [`airframe`] | the body of a vehicle: the parts that are seen, and the parts that touch |
 //! | [`attached`] | the vehicles whose files a recording has attached |
 //! | [`beyond`] | time of a flight beyond the validated envelope of its vehicle |
+//! | [`ground`] | flights below the ground, with a backend that has no contacts |
 //! | [`columns`], [`export`] | recordings as tables: Parquet and CSV |
 //! | [`topics`] | names of topics and of message types |
 //! | [`urdf`] | a vehicle as other tools show it |
@@ -34,6 +35,7 @@ mod cells;
 pub mod columns;
 #[cfg(feature = "tables")]
 pub mod export;
+pub mod ground;
 pub mod identification;
 pub mod judge;
 pub mod page;

@@ -1,6 +1,7 @@
 //! The summary of a run: for people, and as JSON for programs.
 
 use crate::beyond::{self, Beyond};
+use crate::ground::{self, BelowGround};
 use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
 use bus::plan::Plan;
@@ -69,6 +70,8 @@ pub struct Summary {
     pub replacements: Vec<Replacement>,
     /// Quantities beyond the envelope in which the vehicle's model was validated; `None` of a flight that was not recorded.
     pub beyond: Option<Vec<Beyond>>,
+    /// Flights below the ground with a backend that has no contacts; `None` of a flight that was not recorded.
+    pub below_ground: Option<Vec<BelowGround>>,
     /// Names of vehicles with an envelope that was not evaluated, because the flight was not recorded.
     #[serde(skip)]
     pub unevaluated: Vec<String>,
@@ -176,6 +179,7 @@ impl Summary {
             compare: Vec::new(),
             replacements,
             beyond: None,
+            below_ground: None,
             unevaluated: Vec::new(),
             shadows: Vec::new(),
             warnings: Vec::new(),
@@ -237,6 +241,7 @@ impl Summary {
         shadow::add_steps(recording, plan, &mut self.replacements)?;
         self.shadows = shadow::differences(recording, &shadow::joins(plan, &self.replacements))?;
         self.beyond = Some(beyond::of(recording)?);
+        self.below_ground = Some(ground::of(recording, plan)?);
         self.recording = Some(recording.path().to_owned());
         Ok(())
     }
@@ -330,6 +335,7 @@ impl fmt::Display for Summary {
         self.compare.iter().try_for_each(|errors| writeln!(f, "{errors}"))?;
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         self.beyond.iter().flatten().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
+        self.below_ground.iter().flatten().try_for_each(|below| writeln!(f, "{below}"))?;
         self.unevaluated.iter().try_for_each(|name| {
             let name = printable_line(name);
             writeln!(f, "  the flight envelope of {name} was not evaluated: it needs a recording")

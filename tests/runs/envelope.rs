@@ -65,3 +65,22 @@ fn a_flight_without_a_recording_says_that_its_envelope_was_not_evaluated() {
     let flown = place.call(&unrecorded);
     assert!(!flown.output.contains("envelope"), "{}", flown.output);
 }
+
+#[test]
+fn a_flight_below_the_ground_is_told_where_the_ground_does_not_carry() {
+    let place = Place::new();
+    let fall = "process.plant.parameters.initial_velocity_m_s=[0.0, 0.0, -6.0]";
+    let manifest = repository("manifests/hover.toml");
+    let flown = |more: &[&str]| {
+        let recording = place.path("fall.mcap");
+        let short = ["--set", "run.duration_s=2", "--record", &recording];
+        place.call(&[&["run", &manifest], &short[..], more].concat()).output
+    };
+    let text = flown(&["--set", fall]);
+    assert!(text.contains("below the ground on /plant/state: first at 0."), "{text}");
+    assert!(text.contains("set `backend = \"rapier\"`"), "{text}");
+    let json = flown(&["--set", fall, "--json"]);
+    assert!(json.contains("\"below_ground\"") && json.contains("\"depth_m\": 1."), "{json}");
+    let level = flown(&[]);
+    assert!(!level.contains("below the ground"), "{level}");
+}
