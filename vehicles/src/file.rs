@@ -15,7 +15,7 @@ use crate::vehicle::{MotorModel, ROTORS_MAX, Rotor, Vehicle};
 use diagnostics::unit::{
     ACCELERATION, INERTIA, LENGTH, MASS, PURE_NUMBER, SPEED, THRUST_COEFFICIENT, TIME, TORQUE_COEFFICIENT,
 };
-use diagnostics::{Diagnostic, Faults};
+use diagnostics::{Diagnostic, Faults, ParameterError};
 use inputs::{FileKind, FileRole, InputFiles};
 use toml::de::DeTable;
 
@@ -283,9 +283,24 @@ fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
     // The first table tells where; with none at all, the file's start does.
     let at = sections.first().map_or(0..0, |section| section.at.clone());
     match rotors.len() {
-        1..=ROTORS_MAX => Ok(rotors),
+        1..=ROTORS_MAX => require_names(&sections).map(|()| rotors),
         count => Err(root.doc.bad(&at, "rotors", format!("1 to {ROTORS_MAX} rotors"), format!("{count}"))),
     }
+}
+
+/// Refuses two rotors of one name: messages and reports tell rotors apart by their names.
+fn require_names(rotors: &[Section]) -> Result<(), Diagnostic> {
+    let named = |section: &Section| section.text("name").map(str::to_owned);
+    let names = Diagnostic::gather(rotors.iter().map(named))?;
+    let twice = names.iter().enumerate().filter_map(|(second, name)| {
+        let first = names[..second].iter().position(|other| other == name)?;
+        let (section, at) = (&rotors[second], |rotor: usize| rotors[rotor].at_of("name"));
+        let line = section.doc.place(&at(first)).line;
+        let found = format!("\"{name}\", the name of `rotors.{first}` in line {line}");
+        let error = ParameterError::value(section.key("name"), "a name that no other rotor has", found);
+        Some(Err::<(), _>(Diagnostic::at(section.doc.place_after(&at(second), &at(first)), error)))
+    });
+    Diagnostic::gather(twice).map(drop)
 }
 
 fn one_rotor(section: &Section) -> Result<Rotor, Diagnostic> {

@@ -38,6 +38,11 @@ impl<'t> Document<'t> {
         Place::of(self.file, self.text, span)
     }
 
+    /// The place of the bytes `span`, with the earlier place `first` that belongs to it.
+    pub(crate) fn place_after(&self, span: &Range<usize>, first: &Range<usize>) -> Place {
+        self.place(span).after(self.text, first)
+    }
+
     /// An invalid value.
     pub fn bad(
         &self,

@@ -242,7 +242,10 @@ fn a_vehicle_has_one_to_twelve_rotors() {
     let first = HUMMINGBIRD.find("[[rotors]]").unwrap();
     let last = HUMMINGBIRD.rfind("[[rotors]]").unwrap();
     let (before, rotor) = (&HUMMINGBIRD[..first], &HUMMINGBIRD[last..]);
-    let parse = |count: usize| Vehicle::parse(&format!("{before}{}", rotor.repeat(count)), "bird.toml");
+    let named = |number: usize| rotor.replacen("name = \"left\"", &format!("name = \"rotor {number}\""), 1);
+    let parse = |count: usize| {
+        Vehicle::parse(&format!("{before}{}", (0..count).map(named).collect::<String>()), "bird.toml")
+    };
     for count in [1, 3, 6, 12] {
         let vehicle = parse(count).unwrap();
         assert_eq!(vehicle.rotors.len(), count);
@@ -256,6 +259,18 @@ fn a_vehicle_has_one_to_twelve_rotors() {
     assert!(message.contains("must be 1 to 12 rotors, found 13"), "{message}");
     let message = parse(0).unwrap_err().to_string();
     assert!(message.contains("missing key `rotors`"), "{message}");
+}
+
+#[test]
+fn two_rotors_of_one_name_are_refused_with_both_lines() {
+    let text = HUMMINGBIRD.replace("name = \"rear\"", "name = \"front\"");
+    let fault = Vehicle::parse(&text, "bird.toml").unwrap_err();
+    assert_eq!(fault.key(), "rotors.2.name");
+    let (first, second) = (line_of("name = \"front\""), line_of("name = \"rear\""));
+    assert!(fault.to_string().contains(&format!("`rotors.0` in line {first}")), "{fault}");
+    let shown = format!("{fault:#}");
+    assert!(shown.contains(&format!("{first} | name = ")), "{shown}");
+    assert!(shown.contains(&format!("{second} | name = ")), "{shown}");
 }
 
 /// The first rotor's `position` with a line behind it.
