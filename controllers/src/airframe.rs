@@ -5,7 +5,7 @@ use diagnostics::{Diagnostic, ParameterError, Place};
 use inputs::InputFiles;
 use nalgebra::Vector3;
 use std::path::Path;
-use vehicles::{Provenance, Vehicle};
+use vehicles::{Rotor, Vehicle};
 
 /// A vehicle, and how its rotors are reached.
 ///
@@ -33,8 +33,9 @@ impl ControlledVehicle {
     pub fn load(files: &InputFiles, path: &Path) -> Result<Self, ParameterError> {
         let vehicle = Vehicle::load_from(files, path);
         let vehicle = vehicle.map_err(|error| error.named_by("vehicle"))?;
-        let places = vehicle.provenance.clone();
-        Self::new(vehicle).map_err(|error| at_its_line(files, path, &places, &error).named_by("vehicle"))
+        Allocation::new(&vehicle)
+            .map_err(|error| at_its_line(files, path, &vehicle, &error).named_by("vehicle"))
+            .map(|allocation| Self { vehicle, allocation })
     }
 
     /// `vehicle` with its allocation.
@@ -75,43 +76,117 @@ pub struct HoverModel {
     pub thrust_max_N: f64,
 }
 
-/// The fault at the number of the vehicle file at `path`, or of its base, that it is about.
-fn at_its_line(
-    files: &InputFiles,
-    path: &Path,
-    numbers: &[Provenance],
-    error: &AllocationError,
-) -> Diagnostic {
-    let key = match error {
-        AllocationError::Singular { part: Part::Thrust, .. } => "rotor.thrust_coefficient",
-        AllocationError::Singular { part: Part::Yaw, .. } => "rotors.0.spin",
+/// An arm is too long if it is longer than this multiple of all others: a slip in its unit is 10 at least. Tuned, no source.
+const ARM_RATIO_MAX: f64 = 5.0;
+/// Units of lengths that are smaller than the metre, and their lengths in m.
+const SMALLER: [(&str, f64); 2] = [("cm", 1e-2), ("mm", 1e-3)];
+
+/// A rotor that is much farther from the centre of mass than all others.
+struct FarRotor {
+    number: usize,
+    /// Both distances, in words.
+    message: String,
+    /// The unit in which its number would fit the others; empty without one.
+    help: String,
+}
+
+impl FarRotor {
+    fn of(vehicle: &Vehicle) -> Option<Self> {
+        let arm_m = |rotor: &Rotor| rotor.position_m.norm();
+        let far = |a: &(usize, &Rotor), b: &(usize, &Rotor)| arm_m(a.1).total_cmp(&arm_m(b.1));
+        let (number, rotor) = vehicle.rotors.iter().enumerate().max_by(far)?;
+        let others = vehicle.rotors.iter().enumerate().filter(|(other, _)| *other != number);
+        let next_m = others.map(|(_, other)| arm_m(other)).fold(0.0, f64::max);
+        let far_m = arm_m(rotor);
+        if next_m == 0.0 || far_m <= ARM_RATIO_MAX * next_m {
+            return None;
+        }
+        let near = next_m / ARM_RATIO_MAX..=next_m * ARM_RATIO_MAX;
+        let fits = SMALLER.into_iter().find(|(_, length_m)| near.contains(&(far_m * length_m)));
+        let message = format!(
+            "`rotors.{number}.position` of \"{}\" is {far_m:.3} m from the centre of mass, and the other rotors at most {next_m:.3} m",
+            rotor.name
+        );
+        let help = |(unit, _): (&str, f64)| {
+            format!("is its unit right? With unit = \"{unit}\" it would fit the others")
+        };
+        Some(Self { number, message, help: fits.map_or(String::new(), help) })
+    }
+}
+
+/// The key of the number that `error` is about.
+fn key_of(vehicle: &Vehicle, error: &AllocationError) -> String {
+    match error {
+        AllocationError::Singular { part: Part::Thrust, .. } => "rotor.thrust_coefficient".to_owned(),
+        AllocationError::Unheld { part: Part::Yaw, spins: [counter_clockwise, clockwise], .. } => {
+            // One of those of which there are more turns the wrong way.
+            let most = if counter_clockwise > clockwise { 1.0 } else { -1.0 };
+            let is_most = |rotor: &Rotor| !rotor.has_failed && rotor.spin * most > 0.0;
+            format!("rotors.{}.spin", vehicle.rotors.iter().position(is_most).unwrap_or_default())
+        }
+        AllocationError::Singular { part: Part::Yaw, .. } => "rotors.0.spin".to_owned(),
         AllocationError::Singular { .. }
         | AllocationError::Unheld { .. }
-        | AllocationError::Unbalanced { .. } => "rotors.0.position",
-        AllocationError::SpeedRange { .. } => "command.speed_at_min",
+        | AllocationError::Unbalanced { .. } => "rotors.0.position".to_owned(),
+        AllocationError::SpeedRange { .. } => "command.speed_at_min".to_owned(),
+    }
+}
+
+/// The fault at the number of the vehicle file at `path`, or of its base, that it is about.
+fn at_its_line(files: &InputFiles, path: &Path, vehicle: &Vehicle, error: &AllocationError) -> Diagnostic {
+    let far = FarRotor::of(vehicle).filter(|_| matches!(error, AllocationError::Unbalanced { .. }));
+    let (key, message, help) = match far {
+        Some(FarRotor { number, message, help }) => {
+            (format!("rotors.{number}.position"), format!("{message}: {error}"), help)
+        }
+        None => (key_of(vehicle, error), error.to_string(), String::new()),
     };
-    let message = ParameterError::conflict(key, error);
-    let place = numbers.iter().rev().find(|number| number.key == key).and_then(|number| {
+    let message = ParameterError::conflict(key.as_str(), message);
+    let place = vehicle.provenance.iter().rev().find(|number| number.key == key).and_then(|number| {
         let text = files.text(Path::new(&number.file)).ok()?;
         let line = text.lines().nth(number.line.checked_sub(1)?)?;
         let start = line.as_ptr() as usize - text.as_ptr() as usize;
         Some(Place::of(&number.file, &text, &(start..start + line.len())))
     });
-    match place {
+    let fault = match place {
         Some(place) => Diagnostic::at(place, message),
         None => Diagnostic::in_file(path.display().to_string(), message),
-    }
+    };
+    if help.is_empty() { fault } else { fault.help(help) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::allocation::RotorWrench;
-    use vehicles::Rotor;
 
     fn craft(name: &str) -> ControlledVehicle {
         let path = format!("{}/../vehicles/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         ControlledVehicle::load(&InputFiles::default(), path.as_ref()).unwrap()
+    }
+
+    fn refused(from: &str, to: &str) -> String {
+        let text = vehicles::reference::HUMMINGBIRD.replacen(from, to, 1);
+        let vehicle = Vehicle::parse(&text, "bird.toml").unwrap();
+        let error = Allocation::new(&vehicle).unwrap_err();
+        let fault = at_its_line(&InputFiles::default(), "bird.toml".as_ref(), &vehicle, &error);
+        format!("{} {fault}", fault.key())
+    }
+
+    #[test]
+    fn an_arm_in_the_wrong_unit_is_told_before_its_torque() {
+        let told = refused("[0.17, 0, 0]", "[17, 0, 0]");
+        assert!(told.starts_with("rotors.0.position "), "{told}");
+        for part in ["\"front\" is 17.000 m", "at most 0.170 m: its 4 working rotors", "unit = \"cm\""] {
+            assert!(told.contains(part), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_sense_of_rotation_is_told_at_a_spin() {
+        let told = refused("\"counter-clockwise\"", "\"clockwise\"");
+        assert!(told.starts_with("rotors.0.spin "), "{told}");
+        assert!(told.contains("(1 turn counter-clockwise, 3 clockwise)"), "{told}");
     }
 
     #[test]

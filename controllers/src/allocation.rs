@@ -112,8 +112,9 @@ pub enum AllocationError {
     /// Within their limits, the rotors do not make a torque both ways while they carry the weight.
     #[error(
         "its {working} working rotors of {rotors} cannot hover: while they carry the weight, {part} is not controllable both ways \
-         within the limits of their speeds; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
-         the others take over from one that has failed"
+         within the limits of their speeds{}; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
+         the others take over from one that has failed",
+        turning(*part, *spins)
     )]
     Unheld {
         /// Number of rotors.
@@ -122,6 +123,8 @@ pub enum AllocationError {
         working: usize,
         /// The part that is not controllable.
         part: Part,
+        /// Numbers of working rotors that turn counter-clockwise and clockwise.
+        spins: [usize; 2],
     },
     /// The range of speeds is empty or not finite.
     #[error("rotor speeds must satisfy 0 <= min < max, found min {min_rad_s} and max {max_rad_s} rad/s")]
@@ -146,6 +149,14 @@ fn why(part: Part, (rotors, working): (usize, usize), is_one_way: bool) -> &'sta
         Part::Roll | Part::Pitch if working == 2 => " (two rotors are always in a line)",
         Part::Roll | Part::Pitch => " (are the rotors in a line?)",
         Part::Thrust => " (`rotor.thrust_coefficient` is 0, or no rotors push upwards)",
+    }
+}
+
+/// The numbers of rotors that turn each way, where the part follows from them.
+fn turning(part: Part, [counter_clockwise, clockwise]: [usize; 2]) -> String {
+    match part {
+        Part::Yaw => format!(" ({counter_clockwise} turn counter-clockwise, {clockwise} clockwise)"),
+        Part::Thrust | Part::Roll | Part::Pitch => String::new(),
     }
 }
 
@@ -243,7 +254,9 @@ impl Allocation {
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
         let unbalanced = |part| AllocationError::Unbalanced { rotors, working, part };
         made.unbalanced(thrust_N).map_or(Ok(()), |part| Err(unbalanced(part)))?;
-        made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part }))
+        let counter_clockwise = vehicle.working_rotors().filter(|rotor| rotor.spin > 0.0).count();
+        let spins = [counter_clockwise, working - counter_clockwise];
+        made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part, spins }))
     }
 
     /// The least and greatest thrust (N) to demand if the fraction `reserve` (0 to ½) of the range from
@@ -728,6 +741,15 @@ mod tests {
         let message = refused(Vector3::x() * 0.4).to_string();
         assert!(message.contains("cannot hover") && message.contains("a pitch torque remains"), "{message}");
         assert!(moved(Vector3::x() * 0.02).is_ok(), "the rotors in front and behind balance");
+    }
+
+    #[test]
+    fn a_wrong_sense_of_rotation_is_told_with_the_numbers_of_both() {
+        let mut vehicle = hummingbird();
+        vehicle.rotors[0].spin = -vehicle.rotors[0].spin;
+        let (part, message) = refused(&vehicle);
+        assert_eq!(part, Some(Part::Yaw), "{message}");
+        assert!(message.contains("(3 turn counter-clockwise, 1 clockwise)"), "{message}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::law::Law;
 use bus::context::NodeContext;
 use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
 use bus::{InputMemory, InputMessages};
+use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, refuse};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -66,10 +67,13 @@ fn warn_of_weight(craft: &ControlledVehicle, run: &NodeContext<'_>) {
     let (_, most_N) = craft.allocation.thrust_range_N(0.0);
     let weight_N = craft.vehicle.mass_kg * craft.vehicle.gravity_m_s2;
     if weight_N > most_N {
-        run.warn("vehicle", format!(
-            "`vehicle` \"{}\" weighs {weight_N:.4} N, and its rotors lift {most_N:.4} N at most: the law cannot hold it",
-            craft.vehicle.name
-        ));
+        let message = format!(
+            "`vehicle` \"{}\" weighs {} N, and its rotors lift {} N at most: the law cannot hold it",
+            craft.vehicle.name,
+            digits(weight_N),
+            digits(most_N)
+        );
+        run.warn("vehicle", message);
     }
 }
 
@@ -190,7 +194,7 @@ mod tests {
     fn a_vehicle_too_heavy_for_its_rotors_is_told_with_both_forces() {
         let (outcome, warnings) =
             checked(&hummingbird(|it| it.mass_kg = 480.0), PidGains::default(), 1_000_000);
-        assert!(outcome.is_ok() && warnings[0].message.contains("weighs 4708.8000 N"), "{warnings:?}");
+        assert!(outcome.is_ok() && warnings[0].message.contains("weighs 4708.8 N"), "{warnings:?}");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! | [`Error`] | error of the library's functions; `ComponentFailure` marks failures in flight |
 //! | `nearest` | the known name that was probably meant |
 //! | `place` | position in a file |
+//! | `digits` | numbers with the digits that people read |
 //! | `plain` | messages of the system and of libraries, in words |
 //! | `printable` | untrusted text as a terminal shows it |
 //! | [`mod@parameter`] | parameters of components: the error, and the checks that raise it |
@@ -23,6 +24,7 @@
 
 mod component_failure;
 mod diagnostic;
+mod digits;
 mod error;
 mod nearest;
 pub mod parameter;
@@ -34,6 +36,7 @@ pub mod unit;
 
 pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
+pub use digits::digits;
 pub use error::{Error, Result, find_diagnostic, has_text_of};
 pub use nearest::{did_you_mean, nearest, suggestion, typo_of};
 pub use parameter::ParameterError;

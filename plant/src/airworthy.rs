@@ -4,7 +4,9 @@ use crate::backend::Backend;
 use crate::newton_euler::NewtonEuler;
 use crate::state::{PerRotor, RigidBody, State};
 use bus::context::NodeContext;
+use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, refuse};
+use diagnostics::unit::MASS;
 use vehicles::{CommandMap, MotorModel, Provenance, Vehicle};
 
 /// Below this thrust to weight a vehicle hovers and has next to nothing left to climb, tilt or brake with: at
@@ -111,9 +113,13 @@ pub(crate) fn check_lift(vehicle: &Vehicle, run: &NodeContext<'_>) -> Result<(),
     let on_earth = most_N / (vehicle.mass_kg * GRAVITY_M_S2);
     let message = |what: String| {
         format!(
-            "`vehicle` \"{}\" {what}: its rotors lift {least_N:.4} N to {most_N:.4} N and it weighs {weight_N:.4} N, a \
-             thrust to weight of {ratio:.4}; look at {}",
+            "`vehicle` \"{}\" {what}: its rotors lift {} N to {} N and it weighs {} N{}, a thrust to weight of {}; look at {}",
             vehicle.name,
+            digits(least_N),
+            digits(most_N),
+            digits(weight_N),
+            mass_of_file(vehicle),
+            digits(ratio),
             places_of_lift(vehicle)
         )
     };
@@ -145,6 +151,16 @@ fn least_rad_s(map: &CommandMap) -> f64 {
 fn lift_N(vehicle: &Vehicle, speed_rad_s: f64) -> f64 {
     let upwards: f64 = vehicle.working_rotors().map(|rotor| rotor.axis.z).sum();
     upwards * vehicle.thrust_coefficient * speed_rad_s * speed_rad_s
+}
+
+/// The mass as the file has it, in words; empty for a vehicle that is not of a file.
+fn mass_of_file(vehicle: &Vehicle) -> String {
+    let stated = vehicle.provenance.iter().rev().find(|number| number.key == "body.mass");
+    let in_its_unit = |number: &Provenance| {
+        let factor = MASS.factor(&number.unit)?;
+        Some(format!(" with {} {}, the unit of the file", digits(vehicle.mass_kg / factor), number.unit))
+    };
+    stated.and_then(in_its_unit).unwrap_or_default()
 }
 
 /// The keys that lift and weight come from, with their lines.
@@ -241,7 +257,7 @@ mod tests {
         assert_eq!(lift(|it| (off(it), it.gravity_m_s2 = 0.005).1), (Ok(()), vec![]));
         let message = lift(|it| it.mass_kg = 480.0).0.unwrap_err().to_string();
         assert!(
-            message.contains("thrust to weight of 0.0048") && message.contains("weighs 4708.8000 N"),
+            message.contains("thrust to weight of 0.0047") && message.contains("weighs 4708.8 N"),
             "{message}"
         );
         assert!(message.contains("hummingbird.toml:21: `body.mass`"), "{message}");

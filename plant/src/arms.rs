@@ -1,7 +1,7 @@
 //! Arms of a vehicle: where its rotors are.
 
 use nalgebra::Vector3;
-use vehicles::Vehicle;
+use vehicles::{Rotor, Vehicle};
 
 /// The mean of the rotors' places, from the centre of mass.
 pub(crate) fn amid_rotors_B_m(vehicle: &Vehicle) -> Vector3<f64> {
@@ -12,4 +12,12 @@ pub(crate) fn amid_rotors_B_m(vehicle: &Vehicle) -> Vector3<f64> {
 pub(crate) fn longest_arm_m(vehicle: &Vehicle) -> f64 {
     let middle_B_m = amid_rotors_B_m(vehicle);
     vehicle.rotors.iter().map(|rotor| (rotor.position_m - middle_B_m).norm()).fold(0.0, f64::max)
+}
+
+/// Number of the first rotor with the longest arm.
+pub(crate) fn longest_arm(vehicle: &Vehicle) -> usize {
+    let middle_B_m = amid_rotors_B_m(vehicle);
+    let longest_m = longest_arm_m(vehicle);
+    let is_longest = |rotor: &Rotor| (rotor.position_m - middle_B_m).norm() >= longest_m;
+    vehicle.rotors.iter().position(is_longest).unwrap_or_default()
 }

@@ -2,9 +2,10 @@
 
 use crate::airframe::Airframe;
 use crate::airworthy::places;
-use crate::arms::longest_arm_m;
+use crate::arms::{longest_arm, longest_arm_m};
 use crate::effects::{Effect, Quantity};
 use bus::context::NodeContext;
+use diagnostics::digits;
 use vehicles::{MotorModel, Rotor, Vehicle};
 
 /// Arms above this are odd: the largest multirotors that carry people have 4 to 5 m (Volocopter 2X: 9.15 m across its
@@ -44,9 +45,13 @@ pub(crate) fn tell(airframe: &Airframe, run: &NodeContext<'_>) {
 fn arms(vehicle: &Vehicle) -> Option<String> {
     let arm_m = longest_arm_m(vehicle);
     let message = || {
+        let number = longest_arm(vehicle);
+        let name = vehicle.rotors.get(number).map_or("", |rotor| rotor.name.as_str());
         format!(
-            "has arms of {arm_m:.4} m, expected at most {ARM_MAX_M} m, longer than those of any multirotor; look at {}",
-            lines(vehicle, &["rotors.0.position"])
+            "has arms of {} m, expected at most {ARM_MAX_M} m, longer than those of any multirotor; the longest is that of rotor \
+             {number}, \"{name}\"; look at {}",
+            digits(arm_m),
+            lines(vehicle, &[&format!("rotors.{number}.position")])
         )
     };
     (arm_m > ARM_MAX_M).then(message)
@@ -178,7 +183,7 @@ mod tests {
         let cases: [(Change, &[&str]); 8] = [
             (
                 |it| it.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 88.0 / 0.17),
-                &["arms of 88.0000 m", "`rotors.0.position`"],
+                &["arms of 88 m", "`rotors.0.position`"],
             ),
             (
                 |it| it.rotors[2].position_m = it.rotors[0].position_m,

@@ -283,7 +283,7 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
     let ticks = run.duration_s.get_ref() * f64::from(rate_hz);
     if !(ticks >= 1.0 && ticks <= f64::from(u32::MAX - 2 * WINDOW_TICKS_MAX)) {
         let message = format!("`duration_s` is {} s, which is {ticks} ticks", run.duration_s.get_ref());
-        let help = "a run has between 1 and about 4 thousand million ticks";
+        let help = "a run has between 1 and about 4.29e9 ticks";
         return Err(manifest.problem(&run.duration_s.span(), message, help));
     }
     let help = format!("a window has 1 to {WINDOW_TICKS_MAX} ticks");

@@ -290,7 +290,8 @@ fn a_vehicle_that_its_rotors_do_not_carry_is_refused_and_one_they_hardly_carry_i
     ended.says(&[
         "process `plant`",
         "cannot fly",
-        "thrust to weight of 0.0048",
+        "weighs 4708.8 N with 480 kg, the unit of the file",
+        "thrust to weight of 0.0047",
         &format!("{vehicle}:21: `body.mass`"),
     ]);
     let (manifest, _) = with_vehicle(&place, "{ value = 0.480,", "{ value = 2.0,");
