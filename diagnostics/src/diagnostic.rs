@@ -64,7 +64,9 @@ struct Beside {
 
 impl Diagnostic {
     /// Advice on a file that cannot be read at all.
-    pub const CHECK_PATH: &'static str = "check the path and that it is UTF-8 text";
+    pub const CHECK_PATH: &'static str = "check the path";
+    /// Advice on a file whose bytes are not text.
+    const SAVE_AS_TEXT: &'static str = "save it as UTF-8 text, or check the path";
 
     /// Creates a fault of the whole file.
     #[must_use]
@@ -83,8 +85,9 @@ impl Diagnostic {
     /// A file that cannot be read at all.
     #[must_use]
     pub fn unreadable(file: impl Into<String>, cause: &io::Error) -> Self {
-        Self::in_file(file, format!("cannot read this file: {}", plain(&cause.to_string())))
-            .help(Self::CHECK_PATH)
+        let help =
+            if cause.kind() == io::ErrorKind::InvalidData { Self::SAVE_AS_TEXT } else { Self::CHECK_PATH };
+        Self::in_file(file, format!("cannot read this file: {}", plain(&cause.to_string()))).help(help)
     }
 
     /// The same with `help` as advice.
@@ -378,6 +381,14 @@ mod tests {
     }
 
     #[test]
+    fn advice_on_text_is_given_where_the_bytes_are_no_text() {
+        use std::io::{Error, ErrorKind};
+        let told = |kind| Diagnostic::unreadable("a.toml", &Error::new(kind, "odd")).to_string();
+        assert!(told(ErrorKind::InvalidData).contains("UTF-8"));
+        assert!(told(ErrorKind::NotFound).ends_with("help: check the path"));
+    }
+
+    #[test]
     fn a_misspelt_key_is_one_fault() {
         let at = |error| Diagnostic::at(Place::of("a.toml", "mas = 1", &(0..3)), error);
         let missing = |key: &str| Err::<(), _>(at(ParameterError::missing(key, "")));
@@ -405,6 +416,8 @@ mod tests {
         let shown = format!("{both:#}");
         assert_eq!(shown.matches("bad value").count(), 1, "{shown}");
         assert!(shown.ends_with("named in m.toml:1:1 by plant, and in m.toml:2:1 by controller"), "{shown}");
+        let two = Diagnostic::gather([named(0, "plant", 2)]).unwrap_err();
+        assert!(format!("{two:#}").contains("\nerror: a.toml:2:5: bad value"), "{two:#}");
         // The fault of one of them alone stays beside it.
         let more = Diagnostic::gather([named(0, "plant", 1), named(1, "controller", 2)]).unwrap_err();
         let shown = format!("{more:#}");

@@ -114,7 +114,9 @@ impl Display for FileFaults {
             write!(f, "{}: ", who.join(", "))?;
         }
         let text = |fault: &FileFault| if f.alternate() { fault.shown.clone() } else { fault.text.clone() };
-        f.write_str(&self.each.iter().map(text).collect::<Vec<_>>().join("\n"))
+        // Whoever prints it has written the word before the first.
+        let between = if f.alternate() { "\nerror: " } else { "\n" };
+        f.write_str(&self.each.iter().map(text).collect::<Vec<_>>().join(between))
     }
 }
 

@@ -69,7 +69,12 @@ pub(crate) fn require_text_length(bytes: &[u8]) -> Result<()> {
 
 /// Opens a regular file: to open a pipe waits for whoever writes to it.
 fn open(path: &Path) -> Result<File> {
-    if path.metadata()?.is_file() { File::open(path) } else { Err(Error::other("it is not a regular file")) }
+    let found = path.metadata()?;
+    match (found.is_file(), found.is_dir()) {
+        (true, _) => File::open(path),
+        (_, true) => Err(Error::other("it is a folder")),
+        _ => Err(Error::other("it is not a regular file")),
+    }
 }
 
 #[cfg(test)]
@@ -83,6 +88,8 @@ mod tests {
         for error in [read_text_bytes("/dev/zero".as_ref()), read_bytes("/dev/zero".as_ref())] {
             assert_eq!(error.unwrap_err().to_string(), "it is not a regular file");
         }
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(read_bytes(folder.path()).unwrap_err().to_string(), "it is a folder");
         let long = tempfile::NamedTempFile::new().unwrap();
         long.as_file().set_len(TEXT_BYTES_MAX + 1).unwrap();
         let error = read_text_bytes(long.path()).unwrap_err();

@@ -57,7 +57,7 @@ impl Partial {
         check(&path, &RECORDING)?;
         let location = real.sibling(path.file_name().unwrap_or_default());
         let cannot = || format!("cannot create the recording {}", path.display());
-        let claimed = claim_new(&location).with_context(cannot)?;
+        let claimed = claim_new(&location).map_err(with_advice).with_context(cannot)?;
         Ok(claimed.map(|(file, kept)| Self { real, location, path, file, kept }))
     }
 
@@ -152,6 +152,16 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
         name.push(extension);
     }
     path.with_file_name(name)
+}
+
+/// The same error, with advice where the place may not be written to.
+fn with_advice(error: io::Error) -> io::Error {
+    match error.kind() {
+        kind @ ErrorKind::PermissionDenied => {
+            io::Error::new(kind, format!("{error}\n  help: `--record PATH` writes it elsewhere"))
+        }
+        _ => error,
+    }
 }
 
 /// A new file at `location`, locked, and the new path of the file that lay there before; `None` if another process
@@ -283,6 +293,14 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Locks of one process exclude each other as those of two do: they belong to open files.
+    #[test]
+    fn a_place_that_may_not_be_written_to_has_advice() {
+        let denied = super::with_advice(std::io::ErrorKind::PermissionDenied.into()).to_string();
+        assert!(denied.ends_with("help: `--record PATH` writes it elsewhere"), "{denied}");
+        let missing = super::with_advice(std::io::ErrorKind::NotFound.into()).to_string();
+        assert!(!missing.contains("help"), "{missing}");
+    }
+
     #[test]
     fn a_place_is_claimed_by_one_at_a_time_whatever_the_others_leave() {
         let folder = tempfile::tempdir().unwrap();

@@ -253,7 +253,7 @@ fn what_cannot_be_flown_at_all_is_refused_before_the_first_flight() {
         (HOVERS.replace("name = \"height\"", "name = \"mass\""), "`mass` is the name of another column"),
         (
             HOVERS.replace("[\"run.dur", "[\"process.controller.gains=none.toml\", \"run.dur"),
-            "check the path and that it is UTF-8 text; here, a relative path starts at the folder of the manifest",
+            "check the path; here, a relative path starts at the folder of the manifest",
         ),
         (HOVERS.replace("[\"run.dur", "[\"run.seed=5\", \"run.dur"), "each flight has a seed of its own"),
         (HOVERS.split("[[measure]]").next().unwrap().to_owned(), "neither [[pass]] nor [[measure]]"),
