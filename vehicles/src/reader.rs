@@ -291,7 +291,7 @@ impl<'d, 't> Section<'d, 't> {
         dimension: Dimension,
         origin: Origin,
     ) -> Result<Quantity<'d, 't>, Diagnostic> {
-        let parameter = self.parameter(name)?;
+        let parameter = self.parameter(name).map_err(|fault| self.spelt_out(fault, name, dimension))?;
         let mut faults = Faults::default();
         let value = faults.keep(parameter.need("value", "a number"));
         let number = value.and_then(|value| faults.keep(parameter.number("value", value)));
@@ -300,6 +300,19 @@ impl<'d, 't> Section<'d, 't> {
         let (doc, si, at, unit) = (parameter.doc, number * factor, value.span(), dimension.si());
         let quantity = Quantity { doc, si, key: parameter.path, at, unit };
         quantity.require(si.is_finite(), "a number that is finite in SI")
+    }
+
+    /// The fault of the parameter `name`, with a line to paste where the file has the number alone.
+    fn spelt_out(&self, fault: Diagnostic, name: &'d str, dimension: Dimension) -> Diagnostic {
+        match self.find(name) {
+            Some(number) if matches!(number.get_ref(), DeValue::Integer(_) | DeValue::Float(_)) => {
+                let (value, unit) = (seen(number), dimension.si());
+                fault.help(format!(
+                    "write {name} = {{ value = {value}, unit = \"{unit}\", source = \"none\" }}, with its source if it has one"
+                ))
+            }
+            _ => fault,
+        }
     }
 
     /// A parameter whose value is an array of three numbers, each within `bounds`.

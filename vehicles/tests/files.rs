@@ -225,6 +225,11 @@ fn a_wrong_type_is_named() {
     let mass = line_of("mass = ");
     assert_refused("value = 0.480", "value = \"0.480\"", mass, &["finite number", "the text \"0.480\""]);
     assert_refused(MASS_LINE, "mass = 0.48", mass, &["a table with value, unit, source and uncertainty"]);
+    let bare = refused(MASS_LINE, "mass = 0.48");
+    assert!(
+        bare.help.starts_with("write mass = { value = 0.48, unit = \"kg\", source = \"none\" }"),
+        "{bare}"
+    );
     assert_refused(
         "[0.17, 0, 0]",
         "[0.17, 0]",
