@@ -114,6 +114,14 @@ impl FarRotor {
     }
 }
 
+/// The numbers of rotors that turn each way, where the part follows from them.
+pub(crate) fn turning(part: Part, [counter_clockwise, clockwise]: [usize; 2]) -> String {
+    match part {
+        Part::Yaw => format!(" ({counter_clockwise} turn counter-clockwise, {clockwise} clockwise)"),
+        Part::Thrust | Part::Roll | Part::Pitch => String::new(),
+    }
+}
+
 /// The key of the number that `error` is about.
 fn key_of(vehicle: &Vehicle, error: &AllocationError) -> String {
     match error {

@@ -114,7 +114,7 @@ pub enum AllocationError {
         "its {working} working rotors of {rotors} cannot hover: while they carry the weight, {part} is not controllable both ways \
          within the limits of their speeds{}; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
          the others take over from one that has failed",
-        turning(*part, *spins)
+        crate::airframe::turning(*part, *spins)
     )]
     Unheld {
         /// Number of rotors.
@@ -149,14 +149,6 @@ fn why(part: Part, (rotors, working): (usize, usize), is_one_way: bool) -> &'sta
         Part::Roll | Part::Pitch if working == 2 => " (two rotors are always in a line)",
         Part::Roll | Part::Pitch => " (are the rotors in a line?)",
         Part::Thrust => " (`rotor.thrust_coefficient` is 0, or no rotors push upwards)",
-    }
-}
-
-/// The numbers of rotors that turn each way, where the part follows from them.
-fn turning(part: Part, [counter_clockwise, clockwise]: [usize; 2]) -> String {
-    match part {
-        Part::Yaw => format!(" ({counter_clockwise} turn counter-clockwise, {clockwise} clockwise)"),
-        Part::Thrust | Part::Roll | Part::Pitch => String::new(),
     }
 }
 
@@ -741,15 +733,6 @@ mod tests {
         let message = refused(Vector3::x() * 0.4).to_string();
         assert!(message.contains("cannot hover") && message.contains("a pitch torque remains"), "{message}");
         assert!(moved(Vector3::x() * 0.02).is_ok(), "the rotors in front and behind balance");
-    }
-
-    #[test]
-    fn a_wrong_sense_of_rotation_is_told_with_the_numbers_of_both() {
-        let mut vehicle = hummingbird();
-        vehicle.rotors[0].spin = -vehicle.rotors[0].spin;
-        let (part, message) = refused(&vehicle);
-        assert_eq!(part, Some(Part::Yaw), "{message}");
-        assert!(message.contains("(3 turn counter-clockwise, 1 clockwise)"), "{message}");
     }
 
     #[test]

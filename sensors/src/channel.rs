@@ -17,6 +17,7 @@ use bus::component::{State, StateError, Transfer};
 use bus::context::{NodeContext, SampleTimes};
 use bus::random::{Stream, stream, uniform};
 use bus::sample_ticks::SampleTicks;
+use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 
 /// Steps of a node between two measurements below which it warns that they are not evenly spaced: a fifth of
@@ -108,8 +109,9 @@ impl Timing {
         let (rate_hz, node_hz) = (self.rate_hz, run.period_s().recip());
         refuse(rate_hz * run.period_s() > 1.0 + 1e-9, "rate_hz", || {
             format!(
-                "`rate_hz` is {rate_hz} Hz, expected at most {node_hz} Hz, at which its node computes (run.rate_hz = \
+                "`rate_hz` is {rate_hz} Hz, expected at most {} Hz, at which its node computes (run.rate_hz = \
                  {}, period_ticks = {}); raise run.rate_hz, or lower `period_ticks` or `rate_hz`",
+                digits(node_hz),
                 run.rate_hz(),
                 run.period_ticks
             )
