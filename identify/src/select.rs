@@ -219,8 +219,8 @@ impl StepwiseSearch {
             if open == 0 {
                 break;
             }
-            let round = self.rounds.len() + 1;
-            progress(&format!("round {round} (ends when nothing changes): {open} candidates"));
+            let number = self.rounds.len() + 1;
+            progress(&format!("round {number} (ends when nothing changes): {open} candidates"));
             problem.weigh(&self.base, candidates);
             self.base = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
             self.rounds.push(round(problem, &self.base, &self.accepted, candidates, FALSE_RATE));
