@@ -218,23 +218,22 @@ impl Allocation {
         }
         let (rotors, working) = (vehicle.rotors.len(), vehicle.working_rotors().count());
         let effectiveness = effectiveness(vehicle);
-        let mut spins = vehicle.working_rotors().map(|rotor| rotor.spin);
-        let is_one_way = spins.next().is_none_or(|first| spins.all(|spin| spin == first));
-        let singular = |part| AllocationError::Singular { rotors, working, part, is_one_way };
+        let turn = |way: f64| vehicle.working_rotors().filter(|rotor| rotor.spin * way > 0.0).count();
+        let (spins, weight_N) = ([turn(1.0), turn(-1.0)], vehicle.mass_kg * vehicle.gravity_m_s2);
+        let singular =
+            |part| AllocationError::Singular { rotors, working, part, is_one_way: spins.contains(&0) };
         dependent(&effectiveness).map_or(Ok(()), |part| Err(singular(part)))?;
         let inverse = inverse(&effectiveness).ok_or_else(|| singular(Part::Yaw))?;
         let (square_min_rad2_s2, square_max_rad2_s2) = (min_rad_s * min_rad_s, max_rad_s * max_rad_s);
         let at_full_speed = effectiveness.iter().map(|rotor| torques_first(rotor) * square_max_rad2_s2);
         let bounded = BoundedLeastSquares::new(at_full_speed, square_min_rad2_s2 / square_max_rad2_s2);
-        let (hover, weight_N) = (PerRotor::default(), vehicle.mass_kg * vehicle.gravity_m_s2);
-        let lifting_min = LIFTING_MIN * vehicle.thrust_coefficient;
         let mut made = Self {
             effectiveness,
             inverse,
             bounded,
-            hover,
+            hover: PerRotor::default(),
             weight_N,
-            lifting_min,
+            lifting_min: LIFTING_MIN * vehicle.thrust_coefficient,
             square_min_rad2_s2,
             square_max_rad2_s2,
         };
@@ -244,10 +243,8 @@ impl Allocation {
         let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
         let thrust_N = weight_N.clamp(min_N, max_N);
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
-        let unbalanced = |part| AllocationError::Unbalanced { rotors, working, part };
-        made.unbalanced(thrust_N).map_or(Ok(()), |part| Err(unbalanced(part)))?;
-        let counter_clockwise = vehicle.working_rotors().filter(|rotor| rotor.spin > 0.0).count();
-        let spins = [counter_clockwise, working - counter_clockwise];
+        made.unbalanced(thrust_N)
+            .map_or(Ok(()), |part| Err(AllocationError::Unbalanced { rotors, working, part }))?;
         made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part, spins }))
     }
 
