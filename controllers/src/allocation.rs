@@ -219,9 +219,8 @@ impl Allocation {
         let (rotors, working) = (vehicle.rotors.len(), vehicle.working_rotors().count());
         let effectiveness = effectiveness(vehicle);
         let turn = |way: f64| vehicle.working_rotors().filter(|rotor| rotor.spin * way > 0.0).count();
-        let (spins, weight_N) = ([turn(1.0), turn(-1.0)], vehicle.mass_kg * vehicle.gravity_m_s2);
-        let singular =
-            |part| AllocationError::Singular { rotors, working, part, is_one_way: spins.contains(&0) };
+        let (spins, is_one_way) = ([turn(1.0), turn(-1.0)], turn(1.0) * turn(-1.0) == 0);
+        let singular = |part| AllocationError::Singular { rotors, working, part, is_one_way };
         dependent(&effectiveness).map_or(Ok(()), |part| Err(singular(part)))?;
         let inverse = inverse(&effectiveness).ok_or_else(|| singular(Part::Yaw))?;
         let (square_min_rad2_s2, square_max_rad2_s2) = (min_rad_s * min_rad_s, max_rad_s * max_rad_s);
@@ -232,7 +231,7 @@ impl Allocation {
             inverse,
             bounded,
             hover: PerRotor::default(),
-            weight_N,
+            weight_N: vehicle.mass_kg * vehicle.gravity_m_s2,
             lifting_min: LIFTING_MIN * vehicle.thrust_coefficient,
             square_min_rad2_s2,
             square_max_rad2_s2,
@@ -241,7 +240,7 @@ impl Allocation {
             return Err(singular(Part::Thrust));
         }
         let (min_N, max_N) = made.thrust_range_N(THRUST_RESERVE);
-        let thrust_N = weight_N.clamp(min_N, max_N);
+        let thrust_N = made.weight_N.clamp(min_N, max_N);
         made.hover = made.within_limits(&RotorWrench { thrust_N, ..RotorWrench::default() });
         made.unbalanced(thrust_N)
             .map_or(Ok(()), |part| Err(AllocationError::Unbalanced { rotors, working, part }))?;
