@@ -555,21 +555,12 @@ fn promise(
 mod tests {
     use super::*;
     use crate::run::problem;
-    use crate::simpler::exchanges;
     use crate::simulated::effect;
     use crate::test_flights::{candidate, simulated, with_light_rotors};
     use plant::effects::Effect;
 
     /// The end of a search among mass, thrust and inertia, in which the mass was taken and then given up for the other two.
-    struct Found {
-        selection: Selection,
-        /// The error of the mass.
-        mass: f64,
-        /// True if the equations allow the mass instead of the two.
-        is_allowed: bool,
-    }
-
-    fn found(truth: &[Effect]) -> Found {
+    fn found(truth: &[Effect]) -> Selection {
         let vehicle = with_light_rotors();
         let set = simulated(&vehicle, truth);
         let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
@@ -583,13 +574,9 @@ mod tests {
         let taken = judged(&problem, &declared, &mass, alone, FALSE_RATE);
         let accepted = vec![thrust, inertia];
         let base = problem.fitted(&declared.values, &free_parameters(&accepted));
-        let allowed = exchanges(&problem, (&accepted, &base), std::slice::from_ref(&mass), &[]);
         let rounds = vec![Round { judged: vec![taken], taken: Some(0) }];
         let search = StepwiseSearch { accepted, rounds, base };
-        // Rounds that are offered the mass again may take it, and then no exchange is left to do.
-        let selection = search.finished(&mut problem, &candidates[1..], &mut |_| ());
-        let mass = selection.flown().values[mass.free[0]];
-        Found { selection, mass, is_allowed: !allowed.is_empty() }
+        search.finished(&mut problem, &candidates, &mut |_| ())
     }
 
     #[test]
@@ -609,46 +596,21 @@ mod tests {
         assert!(found.iter().all(|judged| is_promise(judged) && judged.gain > 0.0), "{found:?}");
     }
 
-    /// The end where thrust and the inertia about x and y have these errors.
-    fn found_of([thrust, inertia]: [f64; 2]) -> Found {
-        let inertia = effect("inertia-error", &[("error_xx", inertia), ("error_yy", inertia)]);
-        found(&[effect("thrust-scale", &[("error", thrust)]), inertia])
-    }
-
-    fn names(selection: &Selection) -> Vec<&'static str> {
-        selection.accepted.iter().map(|candidate| candidate.kind.name).collect()
-    }
-
-    #[test]
-    fn a_mass_is_named_instead_of_the_thrust_and_the_inertia_that_stand_for_it() {
-        let Found { selection, mass, is_allowed } = found(&[effect("mass-error", &[("error", 0.2)])]);
-        let withdrawn = &selection.withdrawn;
-        assert!(is_allowed);
-        assert_eq!(names(&selection), ["mass-error"], "{withdrawn:?}");
-        assert!((mass - 0.2).abs() < 0.01, "{mass}");
-        let replaced: Vec<_> = withdrawn.iter().map(|one| (one.effect, one.replaced_by)).collect();
-        let by = Some("mass-error");
-        assert_eq!(replaced, [("inertia-error", by), ("thrust-scale", by)], "{withdrawn:?}");
-        let reason = "mass-error alone predicts as well as inertia-error and thrust-scale together, with fewer parameters";
-        assert!(withdrawn.iter().all(|one| one.reason == reason), "{withdrawn:?}");
-    }
-
-    fn require_both(selection: &Selection) {
-        assert_eq!(names(selection), ["thrust-scale", "inertia-error"], "{:?}", selection.withdrawn);
-        assert!(selection.withdrawn.is_empty(), "{:?}", selection.withdrawn);
-    }
-
     /// More mass turns as the declared vehicle does, and this one turns by a quarter slower.
     #[test]
     fn thrust_and_inertia_stay_where_a_mass_is_far_from_both() {
-        require_both(&found_of([-0.1, 0.2]).selection);
+        let inertia = effect("inertia-error", &[("error_xx", 0.2), ("error_yy", 0.2)]);
+        let selection = found(&[effect("thrust-scale", &[("error", -0.1)]), inertia]);
+        let names: Vec<_> = selection.accepted.iter().map(|candidate| candidate.kind.name).collect();
+        assert_eq!(names, ["thrust-scale", "inertia-error"], "{:?}", selection.withdrawn);
+        assert!(selection.withdrawn.is_empty(), "{:?}", selection.withdrawn);
     }
 
-    /// It turns by a fiftieth faster: too little for the equations, and enough for predictions.
+    /// More mass alone: the search does not end with the two that stand for it.
     #[test]
-    fn thrust_and_inertia_stay_where_a_mass_predicts_worse() {
-        let Found { selection, is_allowed, .. } = found_of([-0.1, -0.12]);
-        assert!(is_allowed, "predictions have nothing to decide");
-        require_both(&selection);
+    fn a_mass_is_named_again_after_it_was_given_up_for_two() {
+        let selection = found(&[effect("mass-error", &[("error", 0.2)])]);
+        let names: Vec<_> = selection.accepted.iter().map(|candidate| candidate.kind.name).collect();
+        assert_eq!(names, ["mass-error"], "{:?}", selection.withdrawn);
     }
 }
