@@ -168,7 +168,7 @@ impl Recording {
     /// Writes the samples that were sent at this tick: first those that count, then those of shadows.
     fn record(&mut self, context: &StepContext<'_>, inputs: AnyInputs<'_>) -> Result<(), RecordingError> {
         let (tick, time_ns) = (context.tick(), context.time_ns());
-        self.watched.look(tick, self.topics.iter().map(|topic| (topic.name.as_str(), &topic.announcement)));
+        self.watched.look(self.topics.iter().map(|topic| (topic.name.as_str(), &topic.announcement)));
         for (input, topic) in self.topics.iter().enumerate() {
             if let Some(cdr) = inputs.fresh(input) {
                 self.writer.write(topic.channel, tick, time_ns, cdr)?;

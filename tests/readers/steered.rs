@@ -146,6 +146,22 @@ fn texts(row: &Value) -> Vec<&str> {
     row.as_array().unwrap().iter().map(|cell| cell.as_str().unwrap()).collect()
 }
 
+/// The recorder finds the page at the first step, whatever its tick is.
+#[test]
+fn the_page_of_a_run_that_was_paused_before_shows_its_newest_tick_after_one_step() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let run = Run::start("hover.toml", &folder.path().join("held.mcap"));
+    let seen = look(&readers, "read_held.mjs", &[run.address.as_ref()]);
+    assert_eq!(seen["wrong"], json!([]));
+    let held = tick(&seen);
+    assert_eq!((tick(&seen["held"]), tick(&seen["stepped"])), (held, held + 1));
+    assert!(seen["held"]["timeNs"].as_u64().unwrap() < held * 1_000_000, "{seen}");
+    assert_eq!(seen["stepped"]["timeNs"], held * 1_000_000, "{seen}");
+    assert_eq!(seen["wentBack"], 0, "time does not go back");
+    run.end();
+}
+
 #[test]
 fn a_browser_flies_a_run_by_sliders_keys_and_a_gamepad() {
     if !crate::skipped::is_steady() {

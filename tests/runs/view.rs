@@ -380,6 +380,32 @@ fn the_page_of_a_live_run_gets_its_newest_samples_ahead_of_the_recording() {
     run.end().with_code(1);
 }
 
+/// The tick of a step need not be one of many.
+#[test]
+fn the_page_of_a_run_that_was_paused_before_gets_its_newest_samples_from_the_first_step_on() {
+    let place = Place::new();
+    let (manifest, recording) = (repository("manifests/hover.toml"), place.path("held.mcap"));
+    let run = place.start(&watched(&manifest, &recording, "run.duration_s=4000"));
+    let mut page = Page::of(&run);
+    page.await_event(|event| event["recordings"] == 1);
+    page.done(&json!({ "request": "pause" }));
+    let newest = json!({ "fields": [{ "topic": "/plant/state", "field": "position.z" }] });
+    assert!(numbers(&page, "newest", &newest).is_empty(), "the recorder has found no page");
+    // The recorder looks again a millisecond after its last look.
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    for _ in 0..2 {
+        let held = page.done(&json!({ "request": "step", "ticks": 1 }));
+        poll("the newest sample is not that of the step", || {
+            let found = numbers(&page, "newest", &newest);
+            (found.first() == Some(&((held - 1) as f64 * 1e6))).then_some(())
+        });
+    }
+    page.done(&json!({ "request": "stop" }));
+    page.await_event(|event| event["run"]["state"] == "ended");
+    drop(page);
+    run.end().with_code(1);
+}
+
 /// Layouts of plots outlive the command, and every page has them.
 #[test]
 fn layouts_are_kept_in_the_folder_of_the_user_s_state() {

@@ -131,8 +131,11 @@ async function awaited(report) {
 function hearOf(run) {
   const [reportServer, reportHeld] = [reporter("server"), reporter("held")];
   let starts = null;
-  // The newest sample of a paused run is shown, unless nobody has watched it before.
-  const isBehind = () => run.status?.state === "paused" && !window.hummingbus.playback?.isReached;
+  // The newest sample of a paused run is shown, unless nobody has watched it before. A page that shows an earlier time is not behind.
+  const isBehind = () => {
+    const { newest, playback } = window.hummingbus;
+    return run.status?.state === "paused" && newest?.isMissing && playback.isFollowing;
+  };
   return new Promise((isHeard) => {
     hear((told) => {
       // A run that has gone back begins another recording; the plots are in the address.
@@ -175,6 +178,7 @@ async function start() {
   shown.isFlat = room.isFlat;
 
   const newest = new Newest(columns[0].fields, () => scopes.feeds[0].fields, reporter("newest"));
+  window.hummingbus.newest = newest;
   const isAhead = () => playback.isFollowing && newest.rows !== null;
   const show = () => {
     const rows = isAhead() ? [newest.rows.room] : feeds.map((feed) => feed.row(playback));

@@ -9,9 +9,9 @@ export class Newest {
   #isAsking = false;
   #calmUntil = 0;
 
-  /** `room` has the fields of the room; `scopes()` those of the scopes. */
+  /** `room` has the fields of the room; `scopes()` those of the scopes. `isMissing` is true if the last answer had no values. */
   constructor(room, scopes, report) {
-    Object.assign(this, { room, scopes, report, rows: null });
+    Object.assign(this, { room, scopes, report, rows: null, isMissing: false });
   }
 
   /** Asks for the newest values. One question at a time: a slow server gets no queue of old ones. */
@@ -22,6 +22,7 @@ export class Newest {
     try {
       const found = await newest({ fields: [...room, ...scopes] });
       this.report("");
+      this.isMissing = found === null;
       // Fields that came meanwhile are not in it.
       const isWhole = room.length === this.room.length && scopes.length === this.scopes().length;
       if (found === null) this.#rest();

@@ -82,8 +82,8 @@ export class Playback {
   /** Lets `ms` of the viewer's time pass. */
   pass(ms) {
     if (!this.isPlaying || this.isReached) return;
-    // After a pause of the browser, time goes on where it was.
-    this.timeNs += Math.min(ms, 100) * 1e6 * this.pace;
+    // After a pause of the browser, time goes on where it was. The time of a frame that comes late may lie before it was asked for.
+    this.timeNs += Math.min(Math.max(ms, 0), 100) * 1e6 * this.pace;
     if (this.isNewest && this.timeNs < this.durationNs - BEHIND_NS) this.timeNs = this.durationNs - AT_ONCE_NS;
     if (this.timeNs >= this.durationNs) {
       this.timeNs = this.durationNs;
