@@ -1,6 +1,7 @@
 //! The vehicle as its controllers know it: its file, the allocation to its rotors, and the models for the loops.
 
-use crate::allocation::{Allocation, AllocationError, Part, THRUST_RESERVE};
+use crate::allocation::{Allocation, AllocationError, THRUST_RESERVE};
+use crate::wrench_part::Part;
 use diagnostics::{Diagnostic, ParameterError, Place};
 use inputs::InputFiles;
 use nalgebra::Vector3;
@@ -111,14 +112,6 @@ impl FarRotor {
             format!("is its unit right? With unit = \"{unit}\" it would fit the others")
         };
         Some(Self { number, message, help: fits.map_or(String::new(), help) })
-    }
-}
-
-/// The numbers of rotors that turn each way, where the part follows from them.
-pub(crate) fn turning(part: Part, [counter_clockwise, clockwise]: [usize; 2]) -> String {
-    match part {
-        Part::Yaw => format!(" ({counter_clockwise} turn counter-clockwise, {clockwise} clockwise)"),
-        Part::Thrust | Part::Roll | Part::Pitch => String::new(),
     }
 }
 

@@ -13,6 +13,7 @@
 //! the thrust as that allows (`bounded`).
 
 use crate::bounded::{BoundedLeastSquares, Parts};
+use crate::wrench_part::Part;
 use bus::Bounded;
 use bus::messages::PerRotor;
 use nalgebra::{Matrix4, Vector3, Vector4};
@@ -50,30 +51,6 @@ pub struct RotorWrench {
     pub thrust_N: f64,
     /// Torque in body axes, N·m.
     pub torque_B_N_m: Vector3<f64>,
-}
-
-/// A part of a wrench.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// Thrust along body z.
-    Thrust,
-    /// Torque about body x.
-    Roll,
-    /// Torque about body y.
-    Pitch,
-    /// Torque about body z.
-    Yaw,
-}
-
-impl std::fmt::Display for Part {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Thrust => "thrust",
-            Self::Roll => "roll",
-            Self::Pitch => "pitch",
-            Self::Yaw => "yaw",
-        })
-    }
 }
 
 /// A set of rotors that cannot be allocated to.
@@ -114,7 +91,7 @@ pub enum AllocationError {
         "its {working} working rotors of {rotors} cannot hover: while they carry the weight, {part} is not controllable both ways \
          within the limits of their speeds{}; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
          the others take over from one that has failed",
-        crate::airframe::turning(*part, *spins)
+        part.turning(*spins)
     )]
     Unheld {
         /// Number of rotors.

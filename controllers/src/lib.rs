@@ -3,8 +3,8 @@
 //! A control law is a type that implements [`law::Law`]; [`controller::Controller`] makes a component of it, and
 //! [`bumpless`] lets any law go on after any other. The rooms, pure cores first:
 //! - [`set_points`]: a pilot's schedule of steps, ramps and doublets; [`sticks`]: a recording of sticks.
-//! - [`allocation`]: from a wrench to the speeds of the rotors; `bounded`: the same beyond their limits; [`airframe`]: the
-//!   vehicle that a law knows.
+//! - [`allocation`]: from a wrench to the speeds of the rotors; [`wrench_part`]: names of its parts; `bounded`: the same
+//!   beyond their limits; [`airframe`]: the vehicle that a law knows.
 //! - [`law_inputs`]: ports of laws; [`control`]: the estimated motion, and what a law answers.
 //! - `gains_file`: gains with units and sources; a law's gains are beside it, ours and the thesis's.
 //! - `altitude_loop`: the part that all laws about hover share.
@@ -86,3 +86,4 @@ pub mod wall_follow;
 pub mod wall_follow_thesis;
 pub mod wall_stop;
 pub mod wall_stop_thesis;
+pub mod wrench_part;
