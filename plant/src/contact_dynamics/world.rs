@@ -352,14 +352,18 @@ fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near
     }
 }
 
-/// Drops points of triangles that are deeper than a triangle that the part only touches. Where a corner of it is touched, parry
-/// may turn the normal to its face, along which the part may reach far beyond it.
+/// Drops points that are deep between two shapes that only touch. Where a corner of a triangle is touched, parry may turn the normal
+/// to the triangle's face, along which the part may reach far beyond it. Where two equal prisms stand on each other, it may take the
+/// normal of a side that both share.
 fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifolds: &mut [Manifold]) {
-    let Some(mesh) = thing.0.shape().as_trimesh() else { return };
+    let shape = thing.0.shape();
     for manifold in manifolds {
-        let is_deep = manifold.points.iter().any(|point| point.dist < -OVERLAP_M);
-        let triangle: &dyn Shape = &mesh.triangle(manifold.subshape1);
-        if is_deep && !overlap((triangle, thing.1), (part.0.shape(), part.1), ROUNDING_M) {
+        if !manifold.points.iter().any(|point| point.dist < -OVERLAP_M) {
+            continue;
+        }
+        let triangle = shape.as_trimesh().map(|mesh| mesh.triangle(manifold.subshape1));
+        let one: &dyn Shape = triangle.as_ref().map_or(shape, |triangle| triangle);
+        if !overlap((one, thing.1), (part.0.shape(), part.1), ROUNDING_M) {
             manifold.points.retain(|point| point.dist >= -OVERLAP_M);
         }
     }
