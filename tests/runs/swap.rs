@@ -302,11 +302,12 @@ fn a_live_swap_to_a_sensor_with_new_measurements_at_other_ticks_is_warned_of() {
     launch.await_slot("gps", 1);
     refuse_heavy(&place, &run);
     launch.release();
-    let told = ["warning: ", "0, 80, 130, 180, … (20 Hz)", "some of its samples are never sent"];
+    let told = ["warning: ", "0, 80, 140, 180, … (20 Hz)", "some of its samples are never sent"];
     let ended = first.end_among_others().with_code(0);
     ended.says(&told);
     let answer = ended.json();
-    assert!(answer["warnings"][0].as_str().unwrap().contains("as before"), "{answer}");
+    let warnings = answer["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|one| one.as_str().unwrap().contains("as before")), "{answer}");
     launch.end().with_code(1);
 }
 
