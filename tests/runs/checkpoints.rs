@@ -688,7 +688,8 @@ fn what_does_not_fit_is_refused_in_words() {
         let manifest = place.write("bad.toml", format!("include = [{hover:?}]\n{more}"));
         place.call(&["check", &manifest]).with_code(2).says(&[part]);
     }
-    let hover = repository("manifests/hover.toml");
+    // Without a recording, checkpoints lie beside the manifest.
+    let hover = place.write("m.toml", format!("include = [{:?}]\n", repository("manifests/hover.toml")));
     let args = ["run", &hover, "--record", "none", "--in-process", "--set", "run.duration_s=0.1"];
     let every = |time: &str| place.call(&[&args[..], &["--checkpoint-every", time]].concat());
     let neighbours = ["which is 1.5 ticks", "such as 0.001 s or 0.002 s"];
