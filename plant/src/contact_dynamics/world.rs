@@ -357,6 +357,12 @@ fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near
 /// normal of a side that both share.
 fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifolds: &mut [Manifold]) {
     let shape = thing.0.shape();
+    // Round shapes are told rightly, and to ask again takes time and memory.
+    let is_polyhedron =
+        |shape: &dyn Shape| shape.as_cuboid().is_some() || shape.as_convex_polyhedron().is_some();
+    if shape.as_trimesh().is_none() && !(is_polyhedron(shape) && is_polyhedron(part.0.shape())) {
+        return;
+    }
     for manifold in manifolds {
         if !manifold.points.iter().any(|point| point.dist < -OVERLAP_M) {
             continue;
