@@ -74,7 +74,7 @@ impl BumplessTransfer {
     ) -> ControlOutput {
         self.take_over(law, state, inputs, last_wrench);
         let last = state.wrench();
-        let mut output = law.step(state.law_state_mut(), &last, inputs);
+        let mut output = law.step(state.words_mut(), &last, inputs);
         output.wrench = self.with_residual(state, &output.wrench);
         state.id = self.id;
         state.integrals = output.integrals;
@@ -95,16 +95,16 @@ impl BumplessTransfer {
             let from = Predecessor {
                 wrench,
                 integrals: (!state.is_new()).then_some(state.integrals),
-                state: (state.id.state == self.id.state).then(|| state.law_state()),
+                state: (state.id.layout() == self.id.layout()).then(|| state.words()),
             };
             let (mut begun, last) = (law.start(Some(&from), inputs), law.last_wrench(Some(&wrench)));
             *state = ControllerState::default();
-            *state.law_state_mut() = begun;
+            *state.words_mut() = begun;
             state.set_wrench(&last);
             let asked = law.step(&mut begun, &last, inputs).wrench;
             self.keep_residual(state, &wrench, &asked);
         } else if state.is_new() {
-            *state.law_state_mut() = law.start(None, inputs);
+            *state.words_mut() = law.start(None, inputs);
             state.set_wrench(&law.last_wrench(None));
         }
     }

@@ -2,12 +2,13 @@
 //!
 //! A process is swapped for one of another law, also in Python or C++, only if the states of both have one layout.
 //! The state therefore holds the quantities that mean the same to all laws, and room for the law's own state. That is a
-//! typed message, [`Law::State`]. Only a law with the same type of state reads it.
+//! typed message, [`Law::State`]. Only a law with the same type of state reads it, and only if no other program has flown since.
 
 use crate::allocation::RotorWrench;
 use crate::control::Integrals;
 use crate::law::Law;
 use bus::Message;
+use bus::random::{FNV_OFFSET, fnv1a};
 
 /// The most 64-bit words that a law's own state takes.
 const WORDS_MAX: usize = 32;
@@ -23,9 +24,9 @@ pub(crate) struct LawId {
     /// The law's name, zeros behind.
     #[field(unit = "1")]
     name: [u8; NAME_MAX],
-    /// Layout hash of its state.
+    /// Layout hash of its state, combined with its name.
     #[field(unit = "1")]
-    pub state: u64,
+    state: u64,
 }
 
 impl LawId {
@@ -34,7 +35,13 @@ impl LawId {
         const { assert!(L::INFO.name.len() <= NAME_MAX, "a law's name fits into `NAME_MAX` bytes") }
         let mut name = [0; NAME_MAX];
         name[..L::INFO.name.len()].copy_from_slice(L::INFO.name.as_bytes());
-        Self { name, state: L::State::SCHEMA.layout_hash() }
+        Self { name, state: L::State::SCHEMA.layout_hash() ^ fnv1a(&name, FNV_OFFSET) }
+    }
+
+    /// Layout hash of the law's state. If a program in another language has written only its own name, this is the hash of no layout: the
+    /// words are still those of the law before.
+    pub fn layout(&self) -> u64 {
+        self.state ^ fnv1a(&self.name, FNV_OFFSET)
     }
 }
 
@@ -81,16 +88,56 @@ impl ControllerState {
         self.torque = wrench.torque_B_N_m.into();
     }
 
-    /// The law's own state, which is an `S`.
+    /// The law's own state; `None` if the program that flew last has left no `S`.
+    ///
+    /// It compares hashes of layouts, and allocates to compute one: a step does not call it.
     #[must_use]
-    pub fn law_state<S: Message>(&self) -> &S {
+    pub fn law_state<S: Message>(&self) -> Option<&S> {
+        (self.id.layout() == S::SCHEMA.layout_hash()).then(|| self.words())
+    }
+
+    /// As [`Self::law_state`], to be changed.
+    pub fn law_state_mut<S: Message>(&mut self) -> Option<&mut S> {
+        if self.law_state::<S>().is_some() { Some(self.words_mut()) } else { None }
+    }
+
+    /// The first words as an `S`, which the caller knows them to be.
+    pub(crate) fn words<S: Message>(&self) -> &S {
         const { assert!(size_of::<S>() <= 8 * WORDS_MAX, "a law's state fits into `WORDS_MAX` words") }
         bytemuck::from_bytes(&bytemuck::bytes_of(&self.law_state)[..size_of::<S>()])
     }
 
-    /// As [`Self::law_state`], to be changed.
-    pub fn law_state_mut<S: Message>(&mut self) -> &mut S {
+    /// As [`Self::words`], to be changed.
+    pub(crate) fn words_mut<S: Message>(&mut self) -> &mut S {
         const { assert!(size_of::<S>() <= 8 * WORDS_MAX, "a law's state fits into `WORDS_MAX` words") }
         bytemuck::from_bytes_mut(&mut bytemuck::bytes_of_mut(&mut self.law_state)[..size_of::<S>()])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foresight::ForesightState;
+    use crate::geometric::GeometricLaw;
+    use crate::lqr::LqrLaw;
+    use crate::pid::PidState;
+
+    #[test]
+    fn a_law_s_own_state_is_read_by_its_type_alone() {
+        let mut state = ControllerState { id: LawId::of::<GeometricLaw>(), ..ControllerState::default() };
+        state.law_state_mut::<ForesightState>().unwrap().thrust_made = 4.7;
+        assert_eq!(state.law_state::<ForesightState>().map(|left| left.thrust_made), Some(4.7));
+        assert_eq!(state.law_state::<PidState>(), None);
+        assert_eq!(state.law_state_mut::<PidState>(), None);
+        assert_eq!(ControllerState::default().law_state::<ForesightState>(), None);
+    }
+
+    #[test]
+    fn a_program_that_writes_its_name_leaves_no_state_of_the_law_before() {
+        let id = LawId::of::<GeometricLaw>();
+        assert_eq!(id.layout(), LawId::of::<LqrLaw>().layout(), "they have one type of state");
+        let program = LawId { name: *b"python\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", ..id };
+        let state = ControllerState { id: program, ..ControllerState::default() };
+        assert_eq!(state.law_state::<ForesightState>(), None);
     }
 }

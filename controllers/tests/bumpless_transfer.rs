@@ -248,7 +248,7 @@ fn a_predecessor_gone_mad_is_not_gone_on_from() {
 fn what_a_tracking_law_gone_mad_foresaw_is_not_gone_on_from() {
     for mad in [f64::NAN, f64::INFINITY, 1e9, -1e9] {
         let go_mad = |state: &mut ControllerState| {
-            let foresight: &mut ForesightState = state.law_state_mut();
+            let foresight: &mut ForesightState = state.law_state_mut().unwrap();
             (foresight.thrust_made, foresight.thrust_made_rate) = (mad, mad);
             (foresight.torque_made, foresight.torque_made_rate) = ([mad; 3], [mad; 3]);
             foresight.observer.velocity_foreseen = [mad; 3];
@@ -256,8 +256,33 @@ fn what_a_tracking_law_gone_mad_foresaw_is_not_gone_on_from() {
         assert_outlives(&lqr(), &geometric(), go_mad);
         assert_outlives(&geometric(), &lqr(), go_mad);
         assert_outlives(&geometric(), &lqr(), |state| {
-            state.law_state_mut::<ForesightState>().observer.answer = [mad; 3];
+            state.law_state_mut::<ForesightState>().unwrap().observer.answer = [mad; 3];
         });
         assert_outlives(&lqr(), &geometric(), |state| (state.thrust, state.torque) = (mad, [mad; 3]));
     }
+}
+
+/// The observer's answer along x at the first step of `lqr` after `geometric`, which left 1 m/s²; `between` is what another program
+/// writes into the state.
+fn answer_after(between: impl Fn(&mut ControllerState)) -> f64 {
+    let mut flight = Loop::new(Vector3::new(2.0, 0.0, 1.5), Senses::new(1, ROOM, NOISY));
+    flight.reference.position = Point { x: 2.0, y: 0.0, z: 1.5 };
+    flight.step(&geometric());
+    flight.law_state.law_state_mut::<ForesightState>().unwrap().observer.answer[0] = 1.0;
+    between(&mut flight.law_state);
+    flight.step(&lqr());
+    flight.law_state.law_state::<ForesightState>().unwrap().observer.answer[0]
+}
+
+#[test]
+fn what_a_law_foresaw_before_another_program_flew_is_not_gone_on_from() {
+    let kept = answer_after(|_| {});
+    assert!(kept > 0.9, "directly after the other law it is: {kept} m/s²");
+    let forgotten = answer_after(|state| {
+        // As a program in Python or C++ does: its name, with which the state begins, and zeros behind.
+        let name = &mut bytemuck::bytes_of_mut(state)[..24];
+        name.fill(0);
+        name[..6].copy_from_slice(b"python");
+    });
+    assert!(forgotten.abs() < 0.1, "{forgotten} m/s²");
 }

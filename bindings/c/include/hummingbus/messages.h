@@ -786,13 +786,13 @@ static const HbMessage HB_COMPLEMENTARY_STATE = { "hummingbus_msgs/msg/Complemen
 typedef struct HbLawId {
   // The law's name, zeros behind. [1]
   uint8_t name[24];
-  // Layout hash of its state. [1]
+  // Layout hash of its state, combined with its name. [1]
   uint64_t state;
 } HbLawId;
 
 static const HbField HB_LAW_ID_FIELDS[] = {
   { "name", "The law's name, zeros behind.", "1", "", offsetof(HbLawId, name), HB_U8, NULL, 24, 0, 0 },
-  { "state", "Layout hash of its state.", "1", "", offsetof(HbLawId, state), HB_U64, NULL, 0, 0, 0 },
+  { "state", "Layout hash of its state, combined with its name.", "1", "", offsetof(HbLawId, state), HB_U64, NULL, 0, 0, 0 },
 };
 
 static const HbMessage HB_LAW_ID = { "hummingbus_msgs/msg/LawId", "Law that a state belongs to; zero before the first tick.", sizeof(HbLawId), HB_LAW_ID_FIELDS, 2 };

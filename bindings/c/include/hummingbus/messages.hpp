@@ -756,14 +756,14 @@ namespace hummingbus::msgs {
 struct LawId {
   // The law's name, zeros behind. [1]
   std::array<std::uint8_t, 24> name{};
-  // Layout hash of its state. [1]
+  // Layout hash of its state, combined with its name. [1]
   std::uint64_t state{};
 };
 } // namespace hummingbus::msgs
 
 HUMMINGBUS_MESSAGE(hummingbus::msgs::LawId, "hummingbus_msgs/msg/LawId", "Law that a state belongs to; zero before the first tick.",
     HUMMINGBUS_FIELD(name, "1", "", "The law's name, zeros behind."),
-    HUMMINGBUS_FIELD(state, "1", "", "Layout hash of its state."));
+    HUMMINGBUS_FIELD(state, "1", "", "Layout hash of its state, combined with its name."));
 
 namespace hummingbus::msgs {
 // Outputs of the integrators of a law, in units that mean the same to all laws.
