@@ -4,15 +4,13 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;
-use common::{TICK_S, free_body};
+use common::{G_M_S2, TICK_S, free_body};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::{Rig, Scene, Surface};
 use std::f64::consts::TAU;
 use vehicles::Vehicle;
-
-const G_M_S2: f64 = 9.81;
 
 /// Nothing but a rigid body; its moments about x and y are the same.
 fn vehicle() -> Vehicle {

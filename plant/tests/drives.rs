@@ -4,12 +4,10 @@
 use crate::common;
 use crate::skipped::is_left;
 use common::parts::{body, given, joint, keys};
-use common::{TICK_S, hummingbird};
+use common::{G_M_S2, TICK_S, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
-
-const G_M_S2: f64 = 9.81;
 
 /// Moment of inertia of [`BALL`], 2/5 m r²: 3e-4 kg m².
 const BALL_KG_M2: f64 = 0.4 * 0.3 * 0.05 * 0.05;

@@ -4,14 +4,12 @@
 use crate::common;
 use crate::skipped::{is_left, quick_or};
 use common::parts::{body, given, joint};
-use common::{TICK_S, hummingbird};
+use common::{G_M_S2, TICK_S, bodies_energy_J, hummingbird};
 use nalgebra::{Matrix3, Vector3};
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
 use std::f64::consts::PI;
 use vehicles::Vehicle;
-
-const G_M_S2: f64 = 9.81;
 
 /// A scene in which the vehicle is far away.
 fn plant(parts: &[String]) -> Rapier {
@@ -408,16 +406,6 @@ mod thrown {
         prop::array::uniform3(-most..most).prop_map(|numbers| format!("{numbers:?}"))
     }
 
-    fn energy_J(scene: &Scene, plant: &Rapier) -> f64 {
-        let bodies = scene.bodies().zip(plant.bodies()).map(|((_, built), body)| {
-            let w = body.angular_velocity_B_rad_s;
-            0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
-                + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
-                + built.mass_kg * G_M_S2 * body.position_W_m.z
-        });
-        bodies.sum()
-    }
-
     proptest! {
         #![proptest_config(ProptestConfig { cases: drawn(5, 12), failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -462,10 +450,10 @@ mod thrown {
             );
             // The joint's constraint holds from the first step on.
             tick(&mut plant);
-            let mut before_J = energy_J(&scene, &plant);
+            let mut before_J = bodies_energy_J(&scene, &plant);
             for at in 0..800 {
                 tick(&mut plant);
-                let after_J = energy_J(&scene, &plant);
+                let after_J = bodies_energy_J(&scene, &plant);
                 prop_assert!(after_J < before_J + 5e-3 * (1.0 + before_J), "tick {at}: {before_J} J to {after_J} J");
                 before_J = before_J.min(after_J);
                 for found in plant.bodies() {

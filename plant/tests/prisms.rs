@@ -3,12 +3,10 @@
 
 use crate::common;
 use common::parts::{Prism, body, given, keys};
-use common::{TICK_S, hummingbird};
+use common::{G_M_S2, TICK_S, bodies_energy_J, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
-
-const G_M_S2: f64 = 9.81;
 
 /// Top of the table, two triangles without thickness.
 const TABLE_M: f64 = 0.5;
@@ -68,13 +66,7 @@ impl Flight {
 
     /// Kinetic and potential energy of the prisms.
     fn energy_J(&self) -> f64 {
-        let bodies = self.scene.bodies().zip(self.plant.bodies()).map(|((_, built), body)| {
-            let w = body.angular_velocity_B_rad_s;
-            0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
-                + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
-                + built.mass_kg * G_M_S2 * body.position_W_m.z
-        });
-        bodies.sum()
+        bodies_energy_J(&self.scene, &self.plant)
     }
 
     /// Height of the lowest corner of all prisms.

@@ -4,12 +4,10 @@
 use crate::common;
 use crate::skipped::{cases, first, quick_or};
 use bus::random::{stream, uniform};
-use common::{TICK_S, hummingbird};
+use common::{G_M_S2, TICK_S, bodies_energy_J, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
-
-const G_M_S2: f64 = 9.81;
 
 fn given(value: &str, unit: &str) -> String {
     format!("{{ value = {value}, unit = \"{unit}\", source = \"test\", uncertainty = \"exact\" }}")
@@ -60,13 +58,7 @@ impl Stack {
 
     /// Kinetic and potential energy of the bodies.
     fn energy_J(&self) -> f64 {
-        let bodies = self.scene.bodies().zip(self.plant.bodies()).map(|((_, built), body)| {
-            let w = body.angular_velocity_B_rad_s;
-            0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
-                + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
-                + built.mass_kg * G_M_S2 * body.position_W_m.z
-        });
-        bodies.sum()
+        bodies_energy_J(&self.scene, &self.plant)
     }
 
     /// The most energy that any tick adds to the least before it.

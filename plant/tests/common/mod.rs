@@ -5,12 +5,14 @@
 pub mod parts;
 
 use nalgebra::Vector3;
-use plant::{FreeFlight, NewtonEuler, Rapier, RigidBody, State};
+use plant::{Backend, FreeFlight, NewtonEuler, Rapier, RigidBody, State};
 use scenes::Scene;
 use vehicles::Vehicle;
 
 /// The tick of the whole project, 1 kHz.
 pub const TICK_S: f64 = 1e-3;
+/// Gravity of the vehicle files and of scenes without their own.
+pub const G_M_S2: f64 = 9.81;
 
 pub use vehicles::reference::{CRAZYFLIE, HUMMINGBIRD};
 
@@ -88,6 +90,17 @@ pub fn momentum_W(vehicle: &Vehicle, state: &State) -> Vector3<f64> {
 pub fn rapier(model: NewtonEuler, scene: &Scene, body: &RigidBody, crash_speed_m_s: f64) -> Rapier {
     let effects = model.airframe().initial_state(0, "plant", TICK_S);
     Rapier::new(model, effects, scene, body, crash_speed_m_s)
+}
+
+/// Kinetic and potential energy of the free bodies of a scene, in J; zero at rest at the height of the world's origin.
+pub fn bodies_energy_J(scene: &Scene, plant: &Rapier) -> f64 {
+    let bodies = scene.bodies().zip(plant.bodies()).map(|((_, built), body)| {
+        let w = body.angular_velocity_B_rad_s;
+        0.5 * built.mass_kg * body.velocity_W_m_s.norm_squared()
+            + 0.5 * w.dot(&(built.inertia_kg_m2 * w))
+            + built.mass_kg * G_M_S2 * body.position_W_m.z
+    });
+    bodies.sum()
 }
 
 /// A vehicle without effects in free flight.
