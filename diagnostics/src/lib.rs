@@ -5,6 +5,7 @@
 //! | [`Diagnostic`] | fault of a file: the place, what was expected, what was found, what to do |
 //! | [`Error`] | error of the library's functions; `ComponentFailure` marks failures in flight |
 //! | `nearest` | the known name that was probably meant |
+//! | `number_text` | advice on numbers that are written as texts |
 //! | `place` | position in a file |
 //! | `digits` | numbers with the digits that people read |
 //! | `plain` | messages of the system and of libraries, in words |
@@ -27,6 +28,7 @@ mod diagnostic;
 mod digits;
 mod error;
 mod nearest;
+mod number_text;
 pub mod parameter;
 mod place;
 mod plain;
@@ -38,6 +40,7 @@ pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
 pub use digits::digits;
 pub use error::{Error, Result, find_diagnostic, has_text_of};
+pub use number_text::leading_number;
 pub use nearest::{did_you_mean, nearest, suggestion, typo_of};
 pub use parameter::ParameterError;
 pub use place::Place;

@@ -1,6 +1,7 @@
 //! Parameters of components: the error for one that is refused, and the checks that raise it.
 
 use crate::nearest::{nearest, suggestion, typo_of};
+use crate::number_text;
 use crate::place::Place;
 use std::fmt::{self, Display};
 use std::ops::RangeBounds;
@@ -246,19 +247,25 @@ impl ParameterError {
         }
     }
 
-    /// The question for the known key that an unknown one was probably meant to be, or for the name, of a value that is one of several.
+    /// The question for the known key that an unknown one was probably meant to be, or for the name, of a value that is one of several;
+    /// or the line to write in place of a number in quotation marks.
     ///
     /// ```
     /// use diagnostics::ParameterError;
     ///
     /// let error = ParameterError::value("kind", "\"step\", \"ramp\" or \"doublet\"", "\"stp\"");
     /// assert_eq!(error.suggestion().as_deref(), Some("did you mean `step`?"));
+    /// let error = ParameterError::value("run.duration_s", "a number", "the text \"8 s\"");
+    /// assert_eq!(error.suggestion().as_deref(), Some("the unit is in the key's name: write `duration_s = 8.0`"));
     /// ```
     #[must_use]
     pub fn suggestion(&self) -> Option<String> {
         match self {
             Self::Unknown { key, known } => suggestion(last_name(key), known.iter().map(String::as_str)),
-            Self::Value { expected, found, .. } => suggestion(quoted(found).first()?, choices(expected)?),
+            Self::Value { key, expected, found } => match choices(expected) {
+                Some(choices) => suggestion(quoted(found).first()?, choices),
+                None => number_text::advice(key, expected, found),
+            },
             _ => None,
         }
     }

@@ -58,6 +58,8 @@ fn a_parameter_of_another_type_is_named() {
     let path = place.write("type.toml", good().replace("altitude_m = 1.0", "altitude_m = \"high\""));
     let ended = refused_args(&["run", &path], &path);
     ended.says(&["process `pilot`", "initial_altitude_m", "\"high\"", "must be a number, found the text"]);
+    let path = place.write("unit.toml", good().replace("altitude_m = 1.0", "altitude_m = \"1.5 m\""));
+    refused_args(&["run", &path], &path).says(&["process `pilot`", "write `initial_altitude_m = 1.5`"]);
 }
 
 #[test]
@@ -113,6 +115,8 @@ fn a_run_of_no_length() {
     with("-1.0").says(&["`duration_s` is -1 s"]);
     with("nan").says(&["`run.duration_s` is nan, expected a finite number"]);
     with("1e9").says(&["`duration_s` is 1000000000 s"]);
+    with("\"8 s\"").says(&["found the text \"8 s\"", "unit is in the key's name: write `duration_s = 8.0`"]);
+    with("\"800 ms\"").says(&["write `duration_s = 0.8`"]);
     with("\"long\"").says(&["`run.duration_s` must be a number, found the text \"long\""]);
 }
 

@@ -11,7 +11,7 @@ use toml::de::{DeString, DeTable, DeValue};
 use crate::provenance::{NO_SOURCE, Provenance, Stated, Uncertainty};
 use diagnostics::parameter::{Bounds, not_negative, positive};
 use diagnostics::unit::Dimension;
-use diagnostics::{Diagnostic, Faults, ParameterError, Place, nearest, parse_toml};
+use diagnostics::{Diagnostic, Faults, ParameterError, Place, leading_number, nearest, parse_toml};
 
 /// The file being read: for positions, and to gather provenance on the way.
 pub struct Document<'t> {
@@ -304,14 +304,11 @@ impl<'d, 't> Section<'d, 't> {
 
     /// The fault of the parameter `name`, with a line to paste where the file has the number alone.
     fn spelt_out(&self, fault: Diagnostic, name: &'d str, dimension: Dimension) -> Diagnostic {
-        match self.find(name) {
-            Some(number) if matches!(number.get_ref(), DeValue::Integer(_) | DeValue::Float(_)) => {
-                let (value, unit) = (seen(number), dimension.si());
-                fault.help(format!(
-                    "write {name} = {{ value = {value}, unit = \"{unit}\", source = \"none\" }}, with its source if it has one"
-                ))
-            }
-            _ => fault,
+        match self.find(name).and_then(|found| number_alone(found, dimension)) {
+            Some((value, unit)) => fault.help(format!(
+                "write {name} = {{ value = {value}, unit = \"{unit}\", source = \"none\" }}, with its source if it has one"
+            )),
+            None => fault,
         }
     }
 
@@ -465,7 +462,17 @@ impl<'d, 't> Section<'d, 't> {
                 None => self.wrong_type(&key, value, expected),
             });
         };
-        let numbers = Diagnostic::gather([x, y, z].map(|number| self.number("value", number)))?;
+        let numbers = Diagnostic::gather([x, y, z].map(|number| {
+            let read = self.number("value", number);
+            // A line with the key would stand for the whole array.
+            read.map_err(|fault| {
+                if number.get_ref().is_str() {
+                    fault.help("write numbers without quotation marks")
+                } else {
+                    fault
+                }
+            })
+        }))?;
         Ok(std::array::from_fn(|axis| numbers[axis]))
     }
 
@@ -545,6 +552,19 @@ pub(crate) fn seen(value: &Spanned<DeValue<'_>>) -> String {
         DeValue::Datetime(time) => format!("the time {time}"),
         DeValue::Array(_) => "a list".to_owned(),
         DeValue::Table(_) => "a table".to_owned(),
+    }
+}
+
+/// A number that stands without a table, as the file has it, and its unit: that of the SI where a text names none.
+fn number_alone<'v>(found: &'v Spanned<DeValue<'_>>, dimension: Dimension) -> Option<(String, &'v str)> {
+    match found.get_ref() {
+        DeValue::Integer(_) | DeValue::Float(_) => Some((seen(found), dimension.si())),
+        DeValue::String(text) => {
+            let (value, unit) = leading_number(text)?;
+            let unit = if unit.is_empty() { dimension.si() } else { unit };
+            dimension.factor(unit).map(|_| (format!("{value:?}"), unit))
+        }
+        _ => None,
     }
 }
 

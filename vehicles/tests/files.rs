@@ -230,6 +230,12 @@ fn a_wrong_type_is_named() {
         bare.help.starts_with("write mass = { value = 0.48, unit = \"kg\", source = \"none\" }"),
         "{bare}"
     );
+    let text = refused(MASS_LINE, "mass = \"480 g\"");
+    assert!(text.help.starts_with("write mass = { value = 480.0, unit = \"g\", source = "), "{text}");
+    assert!(!refused(MASS_LINE, "mass = \"480 m\"").help.contains("value = 480"), "no unit of mass");
+    let quoted = refused("value = 0.480", "value = \"0.480\"");
+    assert_eq!(quoted.help, "a number has no quotation marks: write `value = 0.48`");
+    assert_eq!(refused("[0.17, 0, 0]", "[\"0.17\", 0, 0]").help, "write numbers without quotation marks");
     assert_refused(
         "[0.17, 0, 0]",
         "[0.17, 0]",
