@@ -117,6 +117,9 @@ pub struct Row {
 const HELD: &str = "commands that repeat to the last digit while the vehicle goes on turning";
 const FILLED: &str = "commands on straight lines that were filled in when the log was exported";
 
+/// Rows of a flight at least: it lasts from one to the next.
+const ROWS_MIN: usize = 2;
+
 /// Rows so far beside the played ones are judged, too: commands beside a stretch show that it was filled in.
 const BESIDE_S: f64 = 2.0;
 
@@ -321,12 +324,9 @@ impl Source<'_> {
 
     /// Refuses a file with too few rows, or with rows of another length than the header's, as with decimal commas.
     fn check_rows(&self) -> Result<(), ParameterError> {
-        self.table.check_lengths().map_err(|cause| refused(self.path, format_args!(": {cause}")))?;
+        let is_whole = self.table.check_lengths().and_then(|()| self.table.check_rows(ROWS_MIN));
+        is_whole.map_err(|cause| refused(self.path, format_args!(": {cause}")))?;
         let rows = &self.table.rows;
-        if rows.len() < 2 {
-            let fault = format_args!(": it has {} rows of data, expected at least 2", rows.len());
-            return Err(refused(self.path, fault));
-        }
         let of_row = |row: table::Row<'_>| self.table.fault_of_length(row).map(|fault| (row.line, fault));
         let Some((line, fault)) = rows.iter().find_map(of_row) else { return Ok(()) };
         Err(refused(self.path, format_args!(", line {line}: {fault}")))

@@ -328,9 +328,7 @@ impl Recording {
                 ),
             ));
         };
-        if table.rows.is_empty() {
-            return Err(refused(file, ": expected at least one row, found none"));
-        }
+        table.check_rows(1).map_err(|cause| refused(file, format_args!(": {cause}")))?;
         let source = Source { file, table: &table };
         let pulses = ParameterError::gather(places.iter().map(|(_, place)| source.pulses_us(*place)));
         let columns = ParameterError::both(source.times_s(time), pulses);
@@ -468,7 +466,7 @@ mod tests {
         assert!(refused("time_s,ch1\n0,1500\n0,1500\n").contains(":3: column `time_s`"));
         assert!(refused("time_s,ch1\n0,15\n").contains("column `ch1`: expected pulses of 800 to 2200 µs"));
         assert!(refused("time_s,ch1,roll\n0,1500,1\n").contains("ch1 to ch16"));
-        assert!(refused("time_s,ch1\n").contains("at least one row"));
+        assert!(refused("time_s,ch1\n").contains("line 1: expected a row of numbers"));
         let all = refused("time_s,ch1,ch2\n0,15,1500\n0,1500,x\n1,15,1500\n2,1500\n");
         let parts = [":5: expected 3 cells", ":3: column `time_s`", ":2: column `ch1`", ":3: column `ch2`"];
         assert!(parts.iter().all(|part| all.contains(part)) && all.lines().count() == 4, "{all}");

@@ -92,9 +92,7 @@ impl Sticks {
         for row in table.rows.iter() {
             rows.push(source.row(row, rows.last()).map_err(|first| source.faults(first))?);
         }
-        if rows.is_empty() {
-            return Err(refused(file, ": expected at least one row of sticks, found none"));
-        }
+        table.check_rows(1).map_err(|cause| refused(file, format_args!(": {cause}")))?;
         Ok(Self { rows, has_yaw_rate: places[3].is_some(), has_altitude: places[4].is_some() })
     }
 
@@ -275,7 +273,7 @@ mod tests {
                 "time_s,roll_deg,pitch_deg,throttle\n".to_owned(),
                 "found time_s, roll_deg, pitch_deg, throttle",
             ),
-            (header.to_owned(), "expected at least one row"),
+            (header.to_owned(), "expected a row of numbers below the header, found none"),
             (format!("{header}0,1\n"), "s.csv:2: expected 3 cells as in the header, found 2"),
             (format!("{header}0,x,2\n1,1\n1,1,nan\n"), "s.csv:3: expected 3 cells as in the header, found 2"),
             (format!("{header}0,x,2\n1,1\n1,1,nan\n"), "s.csv:2: column `roll_deg`"),

@@ -26,6 +26,7 @@ impl CsvLog {
         check_arrays(&table)?;
         table.check_lengths()?;
         let mut time_s = times(&table, form.time)?;
+        table.check_rows(form.rows_min)?;
         let places = rows::Places { name: "line", number: &|row| table.rows.line(row) };
         rows::check_forward(&time_s, form.time, &places)?;
         let part = rows::recording(&time_s, form, &places)?;

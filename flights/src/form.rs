@@ -10,6 +10,8 @@ use crate::declaration::Entry;
 pub struct Form<'a> {
     /// Header, delimiter and decimal mark.
     pub dialect: &'a Dialect,
+    /// Number of rows that the file has at least.
+    pub rows_min: usize,
     /// Number of the recording that is used, from 1.
     pub recording: Option<NonZero<usize>>,
     /// Advice for a file with several recordings.

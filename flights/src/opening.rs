@@ -43,6 +43,9 @@ pub struct Opening<'a> {
     pub patterns: Patterns,
 }
 
+/// Rows of a flight's own log at least: of one sample nothing can be told.
+const ROWS_MIN: usize = 2;
+
 /// A log to be opened.
 struct Asked<'b> {
     /// Its files.
@@ -74,7 +77,11 @@ impl Opening<'_> {
         let asked = Asked {
             files: &declared.files,
             format: entry.format.or(self.declaration.format),
-            form: self.form(entry, time, of_log.collect(), (entry.recording, restarts)),
+            form: Form {
+                // A part may end with its header.
+                rows_min: if declared.files.len() == 1 { ROWS_MIN } else { 0 },
+                ..self.form(entry, time, of_log.collect(), (entry.recording, restarts))
+            },
             entry,
             is_beside: false,
         };
@@ -106,7 +113,7 @@ impl Opening<'_> {
     ) -> Form<'b> {
         const PLAIN: Dialect = Dialect { header_line: None, header: None, delimiter: None, decimal: None };
         let dialect = entry.csv.as_ref().or(self.declaration.csv.as_ref()).unwrap_or(&PLAIN);
-        Form { dialect, recording, restarts, time, channels }
+        Form { dialect, rows_min: 0, recording, restarts, time, channels }
     }
 
     /// The logs of the channels that are in another file than the flight's.
@@ -127,7 +134,11 @@ impl Opening<'_> {
                 logs::parts(self.document, &format!("channels.{quantity}.file"), file, self.patterns)?;
             let restarts = if file.get_ref().are_parts() { CUT } else { CHOOSE_BESIDE };
             let time = channel.time.as_deref().or(of_flight);
-            let form = self.form(entry, time, vec![channel], (channel.recording, restarts));
+            let form = Form {
+                // A voltage may have been measured once.
+                rows_min: usize::from(files.len() == 1),
+                ..self.form(entry, time, vec![channel], (channel.recording, restarts))
+            };
             let asked = Asked { files: &files, format: None, form, entry, is_beside: true };
             let (_, log) = self
                 .open(&asked, reader)

@@ -158,7 +158,19 @@ fn files_that_need_a_key_are_refused_with_it() {
         &["no column `#99`", "29 columns"],
     );
     says("empty", load(b"", CHANNELS, ""), &["empty"]);
-    says("header alone", load(plain.lines().next().unwrap().as_bytes(), CHANNELS, ""), &["log.csv"]);
+    let start = |lines: usize| plain.lines().take(lines).map(|line| format!("{line}\n")).collect::<String>();
+    let blank = format!("{}{}\n", start(1), ",".repeat(28));
+    for (what, text, parts) in [
+        ("header alone", start(1), ["log.csv", "line 1: expected at least 2 rows", "found none"]),
+        ("a row without cells", blank, ["log.csv", "line 1: expected at least 2 rows", "found none"]),
+        (
+            "one row",
+            start(2),
+            ["log.csv", "line 2: expected at least 2 rows", "found 1 before the file ends"],
+        ),
+    ] {
+        says(what, load(text.as_bytes(), CHANNELS, ""), &parts);
+    }
 }
 
 #[test]

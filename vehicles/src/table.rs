@@ -129,6 +129,29 @@ impl Table {
         Err(TableError::LongRows { header_line, line, expected, found })
     }
 
+    /// Refuses a table of fewer than `expected` rows; rows of empty cells do not count.
+    ///
+    /// # Errors
+    /// The last line, and the number of rows.
+    ///
+    /// ```
+    /// use vehicles::table::{Dialect, Table};
+    ///
+    /// let table = Table::parse(b"t,a\n", &["t", "a"], &Dialect::default())?;
+    /// let error = table.check_rows(2).unwrap_err().to_string();
+    /// assert!(error.starts_with("line 1: expected at least 2 rows of numbers below the header, found none"));
+    /// # Ok::<(), vehicles::table::TableError>(())
+    /// ```
+    pub fn check_rows(&self, expected: usize) -> Result<(), TableError> {
+        let filled = || self.rows.iter().filter(|row| row.cells().any(|cell| !cell.is_empty()));
+        let found = filled().take(expected).count();
+        if found == expected {
+            return Ok(());
+        }
+        let line = filled().last().map_or(self.header_line.unwrap_or(1), |row| row.line);
+        Err(TableError::FewRows { line, expected, found })
+    }
+
     /// Returns the fault of a `row` of another length than the header's, in words that follow its line.
     #[must_use]
     pub fn fault_of_length(&self, row: Row<'_>) -> Option<String> {

@@ -79,6 +79,21 @@ pub enum TableError {
         /// The cell with the point.
         other: String,
     },
+    /// Fewer rows than are needed.
+    #[error(
+        "line {line}: expected {} of numbers below the header, found {} before the file ends; check that the file was \
+         written and copied as a whole",
+        if *expected == 1 { "a row".to_owned() } else { format!("at least {expected} rows") },
+        if *found == 0 { "none".to_owned() } else { found.to_string() }
+    )]
+    FewRows {
+        /// The last line of the table, from 1.
+        line: u64,
+        /// Number of rows that are needed.
+        expected: usize,
+        /// Number of rows with anything in them.
+        found: usize,
+    },
     /// Rows that are longer than the header.
     #[error(
         "line {line}: expected {expected} cells as in the header (line {header_line}), found {found}; if commas are decimal \

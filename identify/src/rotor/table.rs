@@ -12,6 +12,9 @@ use super::stand::{Column, Source, short_name};
 /// First bytes of a recording (MCAP's specification, "Magic").
 const RECORDING: &[u8] = b"\x89MCAP0\r\n";
 
+/// Rows of a log at least: a speed is steady between two.
+const ROWS_MIN: usize = 2;
+
 /// The times and the numbers of a log.
 pub struct LogTable {
     file: String,
@@ -79,8 +82,13 @@ fn table(source: &Source, file: &str) -> Result<Table, RotorError> {
     }
     let columns = source.columns.iter().map(|(_, column)| *column).chain(source.time);
     let names: Vec<&str> = columns.map(Column::name).collect();
-    let read =
-        Table::parse(&bytes, &names, source.csv).and_then(|table| table.check_lengths().map(|()| table));
+    let read = Table::parse(&bytes, &names, source.csv).and_then(|table| {
+        table.check_lengths()?;
+        // A file with another header is another file.
+        names.iter().try_for_each(|name| table.column(name).map(drop))?;
+        table.check_rows(ROWS_MIN)?;
+        Ok(table)
+    });
     read.map_err(|cause| unusable(file, cause))
 }
 
