@@ -11,6 +11,7 @@
 //! | `kind` | [`FileKind`]: what is known of the files that a parameter names |
 //! | `content` | bytes with their SHA-256 |
 //! | `store` | files in a folder, named by their SHA-256 |
+//! | `near` | the file that was probably meant |
 //! | `read` | plain reading from the disk, with a limit |
 //! | `tidy` | paths without detours |
 //! | [`variables`] | variables of the environment within paths |
@@ -31,6 +32,7 @@
 mod content;
 mod files;
 mod kind;
+mod near;
 mod read;
 mod store;
 mod tidy;
@@ -39,5 +41,5 @@ pub mod variables;
 pub use content::{sha256, sha256_of};
 pub use files::{InputFile, InputFiles};
 pub use kind::{FileKind, FileRole};
-pub use read::{TEXT_BYTES_MAX, read_bytes};
+pub use read::{TEXT_BYTES_MAX, open, read_bytes};
 pub use tidy::tidy;

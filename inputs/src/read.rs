@@ -1,5 +1,6 @@
 //! Plain reading from the disk: regular files only, and texts up to a limit.
 
+use crate::near;
 use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Read as _, Result};
 use std::os::unix::fs::MetadataExt as _;
@@ -68,11 +69,22 @@ pub(crate) fn require_text_length(bytes: &[u8]) -> Result<()> {
 }
 
 /// Opens a regular file: to open a pipe waits for whoever writes to it.
-fn open(path: &Path) -> Result<File> {
-    let found = path.metadata()?;
+///
+/// ```
+/// let folder = tempfile::tempdir()?;
+/// std::fs::write(folder.path().join("hover.toml"), "")?;
+/// let error = inputs::open(&folder.path().join("hovr.toml")).unwrap_err().to_string();
+/// assert!(error.contains("did you mean") && error.ends_with("hover.toml`?"));
+/// # Ok::<(), std::io::Error>(())
+/// ```
+///
+/// # Errors
+/// If it cannot be opened, or is no regular file. If there is no such file, the files that were probably meant.
+pub fn open(path: &Path) -> Result<File> {
+    let found = path.metadata().map_err(|error| near::with_advice(path, error))?;
     match (found.is_file(), found.is_dir()) {
         (true, _) => File::open(path),
-        (_, true) => Err(Error::other("it is a folder")),
+        (_, true) => Err(Error::other("it is a folder; give the name of one file in it")),
         _ => Err(Error::other("it is not a regular file")),
     }
 }
@@ -89,7 +101,8 @@ mod tests {
             assert_eq!(error.unwrap_err().to_string(), "it is not a regular file");
         }
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(read_bytes(folder.path()).unwrap_err().to_string(), "it is a folder");
+        let of_folder = read_bytes(folder.path()).unwrap_err().to_string();
+        assert_eq!(of_folder, "it is a folder; give the name of one file in it");
         let long = tempfile::NamedTempFile::new().unwrap();
         long.as_file().set_len(TEXT_BYTES_MAX + 1).unwrap();
         let error = read_text_bytes(long.path()).unwrap_err();

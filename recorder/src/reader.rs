@@ -142,7 +142,7 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is not a complete MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        Self::of_file(&File::open(path).map_err(RecordingError::file("open", path))?, path)
+        Self::of_file(&inputs::open(path).map_err(RecordingError::file("open", path))?, path)
     }
 
     /// The complete recording in `file`, which is called `path` in messages.
@@ -182,7 +182,7 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is not an MCAP file.
     pub fn salvage(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(RecordingError::file("open", path))?;
+        let file = inputs::open(path).map_err(RecordingError::file("open", path))?;
         let content = Content::of_file(&file, path)?;
         let source = content.source();
         let is_magic = |at: usize| {

@@ -45,10 +45,11 @@ mod validate;
 mod view;
 
 use anyhow::Result;
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use diagnostics::{nearest, plain};
 use output::{print_error, print_error_json, readable, say};
+use std::path::Path;
 use std::process::ExitCode;
 use table::commands;
 
@@ -159,6 +160,7 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli.command,
         Err(mut error) => {
             suggest_command(&mut error);
+            explain_files(&mut error);
             return refuse(&error);
         }
     };
@@ -199,6 +201,18 @@ fn suggest_command(error: &mut clap::Error) {
     let near = nearest(found, shown.map(clap::Command::get_name)).map(str::to_owned);
     if let Some(near) = near {
         error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near]));
+    }
+}
+
+/// Adds the reason for a file too many: where a shell finds several files for a pattern, it passes the name of each on.
+fn explain_files(error: &mut clap::Error) {
+    let is_file = matches!(
+        error.get(ContextKind::InvalidArg),
+        Some(ContextValue::String(found)) if Path::new(found).exists()
+    );
+    if is_file && error.kind() == ErrorKind::UnknownArgument {
+        let tip = "this is one file more than the command takes; a shell replaces a pattern such as `*` by all names that fit";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
 }
 

@@ -18,6 +18,7 @@
 //! - [`failures`]: nodes that fail, in every way
 //! - [`cleanup`]: runs that are stopped or killed
 //! - [`refusals`], [`refused_parameters`], [`refused_conditions`], [`refused_flights`]: manifests that are wrong
+//! - [`refused_files`]: files that are not there, and folders in their place
 //! - [`all_faults`]: all faults of a manifest at once
 //! - [`manifests`]: includes, sets, settings
 //! - [`backups`]: swaps, shadows and standbys in manifests
@@ -93,6 +94,7 @@ mod profile;
 mod recordings;
 mod refusals;
 mod refused_conditions;
+mod refused_files;
 mod refused_flights;
 mod refused_parameters;
 mod replay;
