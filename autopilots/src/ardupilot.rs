@@ -23,8 +23,8 @@ use crate::rest::Rest;
 use crate::settings;
 use bus::component::Info;
 use bus::context::NodeContext;
-use diagnostics::ParameterError;
 use diagnostics::parameter::{refuse, up_to};
+use diagnostics::{ParameterError, digits, nine_decimals};
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
 use remote_control::RemoteControl;
@@ -219,12 +219,14 @@ fn check_period(period_s: f64) -> Result<(), ParameterError> {
     let period_us = period_s * 1e6;
     let is_short = refuse(period_s >= PERIOD_MAX_S, "period_ticks", || {
         format!(
-            "the period is {period_s} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step"
+            "the period is {} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step",
+            nine_decimals(period_s)
         )
     });
     let is_whole = refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
         format!(
-            "the period is {period_us} us, expected whole microseconds: ArduPilot's clock cuts each step to them"
+            "the period is {} us, expected whole microseconds: ArduPilot's clock cuts each step to them",
+            digits(period_us)
         )
     });
     ParameterError::both(is_short, is_whole).map(drop)

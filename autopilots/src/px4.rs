@@ -25,8 +25,8 @@ use crate::stream::Stream;
 use bus::component::Info;
 use bus::context::NodeContext;
 use bus::messages::{RC_CHANNELS_MAX, RcChannels, StateEstimate};
-use diagnostics::ParameterError;
 use diagnostics::parameter::{finite, refuse, up_to};
+use diagnostics::{ParameterError, nine_decimals};
 use field::MagneticField;
 use folder::Build;
 use mavlink::{Kind, add_frame, frames};
@@ -263,8 +263,8 @@ impl Autopilot for Px4 {
 fn check_period(context: &NodeContext<'_>) -> Result<(), ParameterError> {
     let period_ns = context.tick_ns * u64::from(context.period_ticks);
     refuse(!SENSOR_PERIOD_NS.is_multiple_of(period_ns), "period_ticks", || {
-        let period_s = context.period_s();
-        format!("the period is {period_s} s, expected one of which 4 ms is a multiple: PX4 senses every 4 ms")
+        let period = nine_decimals(context.period_s());
+        format!("the period is {period} s, expected one of which 4 ms is a multiple: PX4 senses every 4 ms")
     })
 }
 

@@ -6,6 +6,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::SetPoint;
 use bus::{FileKind, OutputPorts};
+use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, refuse};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -32,9 +33,10 @@ fn warn_of_late(entries: &[SetPointEntry], run: &NodeContext<'_>) {
     let end_s = run.duration_s();
     for (index, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.at_s >= end_s) {
         run.warn_behind_end("set_points", format!(
-            "`set_points`: set point {index} (the first is 0): `at_s` is {} s, and the run ends at {end_s} s: it never \
+            "`set_points`: set point {index} (the first is 0): `at_s` is {} s, and the run ends at {} s: it never \
              acts",
-            entry.at_s
+            entry.at_s,
+            nine_decimals(end_s)
         ));
     }
 }

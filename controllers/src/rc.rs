@@ -9,6 +9,7 @@ use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{RC_CHANNELS_MAX, RcChannels};
 use bus::{Bounded, OutputPorts};
+use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, finite, not_negative, refuse};
 use inputs::{FileKind, InputFiles};
 use std::collections::BTreeSet;
@@ -172,9 +173,10 @@ fn warn_of_moves(script: &[Move], context: &NodeContext<'_>) {
         context.warn("script", message);
     }
     let end_s = context.duration_s();
+    let end = nine_decimals(end_s);
     for Move { channel, at_s, .. } in script.iter().filter(|it| it.at_s >= end_s) {
         let message = format!(
-            "`script`: channel {channel} moves at {at_s} s, and the run ends at {end_s} s: it never acts"
+            "`script`: channel {channel} moves at {at_s} s, and the run ends at {end} s: it never acts"
         );
         context.warn_behind_end("script", message);
     }
@@ -346,14 +348,20 @@ impl Recording {
         if begin_s > 0.0 {
             context.warn(
                 "data",
-                format!("`data` begins at {begin_s} s of the run: its first pulses are sent from 0 s on; set `from_s` to begin with its first row"),
+                format!(
+                    "`data` begins at {} s of the run: its first pulses are sent from 0 s on; set `from_s` to begin with its first row",
+                    nine_decimals(begin_s)
+                ),
             );
         }
         let end_s = last_s - from_s;
         if end_s < context.duration_s() {
             context.warn(
                 "data",
-                format!("`data` ends at {end_s} s of the run: its last pulses hold from there on"),
+                format!(
+                    "`data` ends at {} s of the run: its last pulses hold from there on",
+                    nine_decimals(end_s)
+                ),
             );
         }
         Ok(())

@@ -11,8 +11,8 @@ use crate::law::Law;
 use bus::context::NodeContext;
 use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
 use bus::{InputMemory, InputMessages};
-use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, refuse};
+use diagnostics::{digits, nine_decimals};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Steps on each motion: a filter that a step multiplies by 2 overflows before 1100 of them, and they take a
@@ -46,8 +46,9 @@ fn check_period(gain_1_s: f64, run: &NodeContext<'_>) -> Result<(), ParameterErr
     let (product, hz) = (gain_1_s * run.period_s(), run.period_s().recip());
     let message = || {
         format!(
-            "`gains` answer a body rate with {gain_1_s} 1/s, and the law computes {hz} times a second: their ratio is \
-             {product:.3}"
+            "`gains` answer a body rate with {} 1/s, and the law computes {} times a second: their ratio is {product:.3}",
+            digits(gain_1_s),
+            digits(hz)
         )
     };
     refuse(product >= DIVERGES, "period_ticks", || {
@@ -119,7 +120,7 @@ fn fly<L: Law>(
                  run.rate_hz do not go together",
                 odd.unwrap_or_default(),
                 step + 1,
-                run.period_s()
+                nine_decimals(run.period_s())
             )
         })?;
     }

@@ -38,10 +38,10 @@ pub mod unit;
 
 pub use component_failure::ComponentFailure;
 pub use diagnostic::{Diagnostic, Faults};
-pub use digits::digits;
+pub use digits::{digits, nine_decimals};
 pub use error::{Error, Result, find_diagnostic, has_text_of};
-pub use number_text::leading_number;
 pub use nearest::{did_you_mean, nearest, suggestion, typo_of};
+pub use number_text::leading_number;
 pub use parameter::ParameterError;
 pub use place::Place;
 pub use plain::plain;

@@ -17,6 +17,7 @@ use crate::rig::{Hold, hold, turns_about};
 use crate::spikes::usual_greatest;
 use crate::still;
 use crate::units::{HUNDREDS, Units, finding, is_gross, of_hundreds, of_unit, short};
+use diagnostics::digits;
 use diagnostics::unit::{ANGLE, ROTOR_SPEED};
 
 /// Above this correlation a logged and a derived vector are the same but for a factor.
@@ -131,7 +132,11 @@ impl Judge<'_> {
         };
         let (unit, _) = quantity.dimension().units.iter().find(fits)?;
         let declared = self.units.unit(quantity);
-        let what = format!("declared in {declared}, its samples are {period_s} s apart, over {span_s} s");
+        let what = format!(
+            "declared in {declared}, its samples are {} s apart, over {} s",
+            digits(period_s),
+            digits(span_s)
+        );
         (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
             .then(|| finding(quantity, Some(of_unit(unit)), &what))
     }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use diagnostics::nine_decimals;
 use vehicles::table::shown;
 
 use crate::clock::{self, NotForward};
@@ -52,11 +53,12 @@ pub fn time_scaling(time: &Entry) -> Result<[f64; 2], LogError> {
 pub fn check_forward(time_s: &[f64], time: Option<&Entry>, places: &Places<'_>) -> Result<(), LogError> {
     let Some(fault) = clock::not_forward(time_s) else { return Ok(()) };
     let name = time.and_then(|time| time.columns.as_deref()?.first()).map_or("", |name| name.plain.as_str());
-    let at = |row: usize| format!("{} s in {} {}", time_s[row], places.name, (places.number)(row));
+    let at =
+        |row: usize| format!("{} s in {} {}", nine_decimals(time_s[row]), places.name, (places.number)(row));
     let (found, advice) = match fault {
         NotForward::Stands => {
             let first_s = time_s.iter().find(|time_s| time_s.is_finite()).unwrap_or(&f64::NAN);
-            let found = format!("the same time, {first_s} s, in all {} rows", time_s.len());
+            let found = format!("the same time, {} s, in all {} rows", nine_decimals(*first_s), time_s.len());
             (found, "name the column that holds the times")
         }
         NotForward::Falls { falling, steps, first: [from, to] } => {
@@ -90,10 +92,11 @@ pub fn recording(time_s: &[f64], form: &Form<'_>, places: &Places<'_>) -> Result
             let numbers: Vec<String> =
                 restarts.iter().take(10).map(|index| (places.number)(*index).to_string()).collect();
             let found = format!(
-                "{count} recordings: the clock starts again in {} {} (first from {before_s} s to {} s)",
+                "{count} recordings: the clock starts again in {} {} (first from {} s to {} s)",
                 places.name,
                 numbers.join(", "),
-                time_s[*first]
+                nine_decimals(before_s),
+                nine_decimals(time_s[*first])
             );
             Err(LogError::unexpected(Spot::Key("time"), "one clock", found, form.restarts))
         }

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use diagnostics::nine_decimals;
+
 use crate::flight::Flight;
 use crate::quantity::Quantity;
 
@@ -23,10 +25,11 @@ const SHORT_S: f64 = 10.0;
 /// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "its {samples} samples lie over {span_s} s, expected at least one in {spacing_max_s} s; the longest time without \
+    "its {samples} samples lie over {} s, expected at least one in {spacing_max_s} s; the longest time without \
      any, of `{channel}`, is {} s: from {} to {}; correct the unit of time or the stamps there, or cut out the part \
      that is used by `from_s` and `to_s`",
-    gap_s,
+    nine_decimals(*span_s),
+    nine_decimals(*gap_s),
     gap[0],
     gap[1]
 )]
@@ -61,7 +64,12 @@ impl fmt::Display for Moment {
         if let Some(line) = self.line {
             write!(f, "line {line}, ")?;
         }
-        write!(f, "{} s{}", self.time_s, if self.is_in_log { " from the log's first sample" } else { "" })
+        write!(
+            f,
+            "{} s{}",
+            nine_decimals(self.time_s),
+            if self.is_in_log { " from the log's first sample" } else { "" }
+        )
     }
 }
 

@@ -41,11 +41,12 @@ pub(crate) fn check_steps(
     let product = fastest_pole_rad_s(&vehicle.motor) * span_s;
     let message = |limit: f64, beyond: &str| {
         format!(
-            "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {span_s} s is {product:.4}, \
+            "`vehicle` \"{}\" has motors whose fastest pole, {:.4} rad/s, times a step of {} s is {product:.4}, \
              expected below {limit}; raise `substeps` or run.rate_hz, or correct `[motor]` of the file: beyond it the \
              {beyond}",
             vehicle.name,
-            product / span_s
+            product / span_s,
+            digits(span_s)
         )
     };
     refuse(product > POLE_STEPS_MAX, "vehicle", || message(POLE_STEPS_MAX, "integration diverges"))?;

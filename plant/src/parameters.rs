@@ -10,8 +10,8 @@ use crate::odd;
 use crate::origin::{Origin, Physics};
 use crate::state::RigidBody;
 use bus::context::NodeContext;
-use diagnostics::Diagnostic;
 use diagnostics::parameter::{ParameterError, finite, positive, refuse, within};
+use diagnostics::{Diagnostic, nine_decimals};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
 use scenes::{Mesh, Scene};
@@ -169,7 +169,8 @@ impl Parameters {
             (window_s / tick_s - ticks).abs() < 1e-6 && (1.0..=f64::from(u32::MAX)).contains(&ticks);
         refuse(!is_whole, "window_s", || {
             format!(
-                "`window_s` is {window_s} s, which is not a whole number of ticks of {tick_s} s, at least one"
+                "`window_s` is {window_s} s, which is not a whole number of ticks of {} s, at least one",
+                nine_decimals(tick_s)
             )
         })?;
         Ok(ticks as u32)

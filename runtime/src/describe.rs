@@ -3,6 +3,7 @@
 use crate::graph::Graph;
 use crate::program::{BackupSpec, Executable, OnExit, Program, Readiness};
 use bus::plan::Pace;
+use diagnostics::nine_decimals;
 use std::fmt;
 
 /// Replacements between the first and the last that are listed one by one.
@@ -21,7 +22,7 @@ impl fmt::Display for Graph {
             f,
             "{} ticks at {rate_hz} Hz ({} s), pace {pace}, window {} ticks, seed {}",
             plan.duration_ticks,
-            f64::from(plan.duration_ticks) * plan.tick_s(),
+            nine_decimals(f64::from(plan.duration_ticks) * plan.tick_s()),
             plan.window_ticks,
             plan.seed
         )?;

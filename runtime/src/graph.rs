@@ -41,7 +41,7 @@ use crate::placement;
 use bus::checkpoint::Parts;
 use bus::plan::Plan;
 use bus::{InputFiles, Registration};
-use diagnostics::{Diagnostic, Faults};
+use diagnostics::{Diagnostic, Faults, nine_decimals};
 use parameters::Notes;
 use processes::DeclaredNode;
 use std::collections::BTreeMap;
@@ -282,7 +282,11 @@ fn plan(manifest: &Manifest, wiring: Wiring) -> Result<Plan, Diagnostic> {
     }
     let ticks = run.duration_s.get_ref() * f64::from(rate_hz);
     if !(ticks >= 1.0 && ticks <= f64::from(u32::MAX - 2 * WINDOW_TICKS_MAX)) {
-        let message = format!("`duration_s` is {} s, which is {ticks} ticks", run.duration_s.get_ref());
+        let message = format!(
+            "`duration_s` is {} s, which is {} ticks",
+            run.duration_s.get_ref(),
+            nine_decimals(ticks)
+        );
         let help = "a run has between 1 and about 4.29e9 ticks";
         return Err(manifest.problem(&run.duration_s.span(), message, help));
     }

@@ -57,7 +57,8 @@ impl Timing {
         ])?;
         let (longest_ms, rate_hz) = (UNDER_WAY_MAX / self.rate_hz * 1e3, self.rate_hz);
         let expected = format!(
-            "at most {longest_ms} ms: at {rate_hz} Hz {UNDER_WAY_MAX} measurements are under way then"
+            "at most {} ms: at {rate_hz} Hz {UNDER_WAY_MAX} measurements are under way then",
+            digits(longest_ms)
         );
         let delay = require("delay_ms", self.delay_ms, self.under_way() <= UNDER_WAY_MAX, &expected);
         let losses = Losses::new(self);
@@ -120,8 +121,9 @@ impl Timing {
         // Off by up to a step of the node: at 60 Hz of 1 kHz a sixteenth of the interval, which cameras have as well.
         if share < UNEVEN_SHARE && (share - share.round()).abs() > 1e-6 * share {
             run.warn("rate_hz", format!(
-                "`rate_hz` is {rate_hz} Hz, which does not divide the {node_hz} Hz at which its node computes: the \
-                 measurements are not evenly spaced"
+                "`rate_hz` is {rate_hz} Hz, which does not divide the {} Hz at which its node computes: the \
+                 measurements are not evenly spaced",
+                digits(node_hz)
             ));
         }
         if self.delay_ms * 1e-3 >= run.duration_s() {

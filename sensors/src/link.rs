@@ -21,8 +21,8 @@ use bus::ports::{
 use bus::random::stream;
 use bus::schema::Extent;
 use bus::{BusError, Message};
-use diagnostics::ParameterError;
 use diagnostics::parameter::{positive_up_to, refuse, require, within};
+use diagnostics::{ParameterError, digits};
 use std::collections::BTreeMap;
 
 /// 57 600 baud, as the thesis sets the XBee modules of its Hummingbird (§2.2).
@@ -489,7 +489,7 @@ impl Parameters {
             format!(
                 "`latency_ms` and `jitter_ms` are {} ms together, expected at most {:.0} ms: {sent_hz:.0} messages are sent each \
                  second, and {UNDER_WAY_MAX} may be under way; shorten the latency, or send less often (`rate_hz`)",
-                self.latency_ms + self.jitter_ms,
+                digits(self.latency_ms + self.jitter_ms),
                 UNDER_WAY_MAX / sent_hz * 1e3
             )
         })?;

@@ -1,6 +1,6 @@
 //! Refused: pass conditions and comparisons.
 
-use crate::refusals::{good, refused, refused_setting, refused_with};
+use crate::refusals::{good, refused, refused_setting, refused_text, refused_with};
 use crate::support::{Place, repository};
 
 /// A condition that holds at the start of the good manifest's flight.
@@ -149,6 +149,18 @@ fn a_condition_that_nothing_can_hold() {
         let ended = refused_with(&PASS.replace("max = 1\n", &format!("max = §{number}\n")));
         ended.says(&[&format!("`pass.0.max` is {number}, expected a finite number")]);
     }
+}
+
+#[test]
+fn a_computed_number_has_no_digits_of_its_rounding() {
+    // Nine times 0.001 is 0.009000000000000001, and 0.003 goes 333.3333333333333 times into 1.
+    let short = good().replace("duration_s = 0.1", "duration_s = 0.009");
+    let late = PASS.replace("max = 1\n", "max = 1\nfrom_s = §0.1\n");
+    refused_text(&(short + &late)).says(&["`from_s` is 0.1 s, and the run ends at 0.009 s: no sample"]);
+    let place = Place::new();
+    let path = place.write("good.toml", good());
+    let odd = place.call(&["check", &path, "--set", "process.mocap.period_ticks=3"]).with_code(0);
+    odd.says(&["`rate_hz` is 100 Hz, which does not divide the 333.33 Hz at which its node computes"]);
 }
 
 #[test]

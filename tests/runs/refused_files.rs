@@ -37,7 +37,7 @@ fn gains_scenes_and_logs_are_told_too() {
     };
     let gains = ("controllers/gains/cascad.toml", "controllers/gains/cascade.toml");
     refused("hover", "process.controller.gains", gains);
-    refused("hover", "process.plant.scene", ("scenes/labyrint.toml", "scenes/labyrinth.toml"));
+    refused("hover-rapier", "process.plant.scene", ("scenes/labyrint.toml", "scenes/labyrinth.toml"));
     let data = place.write("flight.csv", "t\n0\n");
     let set = format!("process.player.data={}", place.path("flight.mcap"));
     let replay = repository("manifests/replay-nanobench.toml");

@@ -12,6 +12,7 @@ use bus::dynamic::{DynamicNode, DynamicTick, Program};
 use bus::process::RUN_VARIABLE;
 use bus::schema::Schema;
 use bus::{BusError, Registration};
+use diagnostics::nine_decimals;
 use inputs::sha256;
 use serde_json::Value;
 use std::cell::RefCell;
@@ -337,7 +338,8 @@ fn require_step(description: &Description, period_s: f64) -> Result<(), String> 
         return Ok(());
     }
     Err(format!(
-        "the FMU computes in steps of {step_s} s, and its process every {period_s} s, which is no multiple; set its period_ticks"
+        "the FMU computes in steps of {step_s} s, and its process every {} s, which is no multiple; set its period_ticks",
+        nine_decimals(period_s)
     ))
 }
 

@@ -3,7 +3,7 @@
 use crate::manifest::Manifest;
 use crate::program::{BackupSpec, Program, unsaved};
 use bus::plan::Plan;
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, nine_decimals};
 use std::ops::Range;
 use toml::Spanned;
 
@@ -47,7 +47,7 @@ pub fn add(
             );
             let help = format!(
                 "choose a time below {} s",
-                f64::from(plan.duration_ticks) * plan.tick_ns as f64 / 1e9
+                nine_decimals(f64::from(plan.duration_ticks) * plan.tick_ns as f64 / 1e9)
             );
             warnings.push(manifest.problem(&every.span(), message, help));
         }
@@ -75,9 +75,10 @@ fn period(manifest: &Manifest, plan: &Plan, every: &Spanned<f64>) -> Result<u32,
     let (message, help) = if ticks > 0.0 && ticks < f64::from(u32::MAX) {
         let below = ticks.floor().max(1.0);
         let neighbours = [below, ticks.ceil().max(1.0)];
-        let [below, above] = neighbours.map(|ticks| format!("{} s", ticks * plan.tick_ns as f64 / 1e9));
+        let [below, above] =
+            neighbours.map(|ticks| format!("{} s", nine_decimals(ticks * plan.tick_ns as f64 / 1e9)));
         let choice = if below == above { above } else { format!("{below} or {above}") };
-        let message = format!("`checkpoint_every_s` is {every_s} s, which is {ticks} ticks");
+        let message = format!("`checkpoint_every_s` is {every_s} s, which is {} ticks", nine_decimals(ticks));
         (message, format!("choose a whole number of ticks, such as {choice}"))
     } else {
         let message = format!("`checkpoint_every_s` is {every_s} s");

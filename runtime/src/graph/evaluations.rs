@@ -5,7 +5,7 @@ use crate::manifest::{Comparison, Manifest, PassCondition, Statistic};
 use crate::program::Program;
 use bus::plan::{NodePlan, Plan};
 use bus::sample_ticks::SampleTicks;
-use diagnostics::{Diagnostic, NotOneLine, did_you_mean, printable_line, require_line};
+use diagnostics::{Diagnostic, NotOneLine, did_you_mean, nine_decimals, printable_line, require_line};
 use recorder::RecordingError;
 use std::ops::Range;
 use toml::Spanned;
@@ -125,7 +125,9 @@ fn check_span(
     let end_s = f64::from(plan.duration_ticks) * plan.tick_s();
     if let Some(to_s) = to_s.filter(|to_s| first_s > to_s + HALF_NS_S) {
         let message = format!(
-            "no sample of {topic} lies from {from_s} s to {to_s} s: it comes every {period_s} s, the next at {first_s} s"
+            "no sample of {topic} lies from {from_s} s to {to_s} s: it comes every {} s, the next at {} s",
+            nine_decimals(period_s),
+            nine_decimals(first_s)
         );
         let help = "widen the span: a span without samples does not pass";
         return Err(at(&["from_s", "to_s"], message, help));
@@ -136,7 +138,7 @@ fn check_span(
     if let Some(to_s) = to_s.filter(|to_s| *to_s > end_s + HALF_NS_S)
         && !notes.is_cut(manifest, &pass.span())
     {
-        let message = format!("`to_s` is {to_s} s, and the run ends at {end_s} s");
+        let message = format!("`to_s` is {to_s} s, and the run ends at {} s", nine_decimals(end_s));
         let help = "only what is flown is judged; leave `to_s` out for the whole rest of the run";
         notes.warnings.push(at(&["to_s"], message, help));
     }
@@ -152,8 +154,9 @@ fn behind_end(manifest: &Manifest, plan: &Plan, pass: &Spanned<PassCondition>) -
         return None;
     }
     let message = format!(
-        "{} `{name}`: `from_s` is {from_s} s, and the run ends at {end_s} s: no sample of {topic} is judged",
-        kind(pass.get_ref())
+        "{} `{name}`: `from_s` is {from_s} s, and the run ends at {} s: no sample of {topic} is judged",
+        kind(pass.get_ref()),
+        nine_decimals(end_s)
     );
     let help = "begin earlier, or raise run.duration_s: a span without samples does not pass";
     let span = blamed(manifest, &pass.span(), "", &["from_s"]);
@@ -245,8 +248,10 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
         return at("", "the comparison has no limit, so it cannot fail".to_owned(), help);
     }
     if let Some(set_s) = reset_window_s(plan, simulated).filter(|set_s| *set_s != window_s) {
-        let message =
-            format!("`window_s` is {window_s} s, but the plant behind {simulated} is set every {set_s} s");
+        let message = format!(
+            "`window_s` is {window_s} s, but the plant behind {simulated} is set every {} s",
+            nine_decimals(set_s)
+        );
         return at("window_s", message, "give both the same length");
     }
     if let Some((key, limit)) = stated.find(|(_, limit)| *limit < 0.0) {
@@ -257,8 +262,9 @@ fn check_window(manifest: &Manifest, plan: &Plan, compare: &Spanned<Comparison>)
     if window_s > 0.0 && window_s <= duration_s - plan.tick_s() + 1e-9 {
         return Ok(());
     }
+    let duration = nine_decimals(duration_s);
     let message =
-        format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration_s} s");
+        format!("`window_s` is {window_s} s: no window of that length ends within the run of {duration} s");
     at("window_s", message, "choose a window shorter than run.duration_s")
 }
 
