@@ -8,7 +8,7 @@ use bus::{Registration, initial};
 use diagnostics::{Diagnostic, Error};
 use fmu::Version;
 use fmu::export::{Contents, Model, ModelVariable, Source};
-use inputs::sha256;
+use inputs::{InputFiles, sha256};
 use runtime::graph::Graph;
 use runtime::manifest::Manifest;
 use std::collections::BTreeSet;
@@ -116,7 +116,7 @@ fn explained(fault: Diagnostic, cut: &[String]) -> Diagnostic {
 
 /// The manifest at `path`, or that of the vehicle file there.
 fn load(path: &Path, overrides: &[String]) -> anyhow::Result<Manifest> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let is_vehicle = text
         .parse::<toml::Table>()
         .is_ok_and(|table| table.contains_key("body") && !table.contains_key("process"));

@@ -40,7 +40,7 @@ const JOINING: [&str; 10] = ["sqrt", "per", "1", "n", "m", "rad", "deg", "kg", "
 pub fn leading_number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
-    let most = text.bytes().take_while(|byte| is_part(byte)).count();
+    let most = text.bytes().take_while(is_part).count();
     // An `e` may begin the unit; no text without a digit is a number.
     let parsed =
         (1..=most).rev().find_map(|end| Some((text[..end].parse::<f64>().ok()?, text[end..].trim())));

@@ -17,7 +17,7 @@ pub(crate) fn with_advice(path: &Path, error: Error) -> Error {
         return error;
     }
     let text = plain(&error.to_string()).into_owned();
-    advice(path).map_or(error, |advice| Error::new(ErrorKind::NotFound, format!("{text}; {advice}")))
+    advice(path).map_or(error, |advice| Error::new(ErrorKind::NotFound, format!("{text} ({advice})")))
 }
 
 fn advice(path: &Path) -> Option<String> {
@@ -114,7 +114,7 @@ mod tests {
             ("runs.mcap", "`run.mcap`"),
             ("note", "`notes`"),
         ] {
-            let expected = format!("No such file or directory; did you mean {meant}?");
+            let expected = format!("No such file or directory (did you mean {meant}?)");
             assert_eq!(told(folder.path(), name), expected, "{name}");
         }
     }
@@ -138,11 +138,11 @@ mod tests {
         let folder = folder(&["hover.toml"]);
         let of_folder = told(folder.path(), "manifest/hover.toml");
         assert!(
-            of_folder.contains("; there is no folder ") && of_folder.ends_with("manifest"),
+            of_folder.contains("(there is no folder ") && of_folder.ends_with("manifest)"),
             "{of_folder}"
         );
         let of_pattern = told(folder.path(), "*.mcap");
-        assert!(of_pattern.ends_with("; no file fits this pattern: give the name of one"), "{of_pattern}");
+        assert!(of_pattern.ends_with("(no file fits this pattern: give the name of one)"), "{of_pattern}");
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub(crate) fn require_text_length(bytes: &[u8]) -> Result<()> {
 /// let folder = tempfile::tempdir()?;
 /// std::fs::write(folder.path().join("hover.toml"), "")?;
 /// let error = inputs::open(&folder.path().join("hovr.toml")).unwrap_err().to_string();
-/// assert!(error.contains("did you mean") && error.ends_with("hover.toml`?"));
+/// assert!(error.contains("did you mean") && error.ends_with("hover.toml`?)"));
 /// # Ok::<(), std::io::Error>(())
 /// ```
 ///

@@ -13,7 +13,7 @@ fn a_file_with_a_near_name_is_told_whatever_it_is() {
         place.write("bird.toml", fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap());
     let refused = |args: &[&str], meant: &str| {
         let meant = format!("`{meant}`");
-        place.call(args).with_code(2).says(&["No such file or directory; did you mean ", &meant]);
+        place.call(args).with_code(2).says(&["No such file or directory (did you mean ", &meant]);
     };
     refused(&["check", &place.path("hovr.toml")], &manifest);
     refused(&["run", &place.path("hover.tml")], &manifest);
