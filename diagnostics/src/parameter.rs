@@ -536,6 +536,12 @@ impl Bounds {
         (self.min..=self.max).contains(&si)
     }
 
+    /// The number `si` for a message on it: without the last digits of a conversion to SI, unless they take it out of the range.
+    fn shown(&self, si: f64) -> f64 {
+        let rounded = format!("{si:.8e}").parse().unwrap_or(si);
+        if self.contains(rounded) { si } else { rounded }
+    }
+
     /// Passes a number within.
     ///
     /// # Errors
@@ -543,7 +549,8 @@ impl Bounds {
     pub fn check(&self, key: &str, si: f64) -> Result<(), ParameterError> {
         let Self { min, max, unit, why } = self;
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        let (expected, found) = (format!("{min:?} to {max:?}{unit} ({why})"), format!("{si:?}{unit}"));
+        let (expected, found) =
+            (format!("{min:?} to {max:?}{unit} ({why})"), format!("{:?}{unit}", self.shown(si)));
         require(key, found, self.contains(si), expected)
     }
 }
@@ -569,6 +576,11 @@ mod tests {
         let bounds = |unit| Bounds { min: 0.0, max: 1.0, unit, why: "it is so" };
         assert!(told(bounds("kg").check("mass", 2.0), "kg").ends_with("found 2.0 kg"));
         assert!(told(bounds("counts").check("command", 2.0), "1").ends_with("found 2.0 counts"));
+        assert!(
+            told(bounds("rad").check("angle", 90.1_f64.to_radians()), "rad")
+                .ends_with("found 1.57254166 rad")
+        );
+        assert!(told(bounds("rad").check("angle", 1.0 + 1e-12), "rad").ends_with("found 1.000000000001 rad"));
         let error = bounds("").check("gain", 2.0);
         assert_eq!(told(error, "rad/s"), "`gain` must be 0.0 to 1.0 (it is so), found 2.0 rad/s");
     }

@@ -1,5 +1,6 @@
 //! Cleaning of a channel: faulty samples are left out, counted and noted.
 
+use diagnostics::nine_decimals;
 use vehicles::Vehicle;
 use vehicles::gaps::GAP_PERIODS;
 
@@ -133,11 +134,13 @@ fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
         let (expected, advice) =
             ("times that increase", "choose another clock or message, or sort the log by time");
         let found = match fault {
-            NotForward::Stands => format!("the same time, {} s, in all {} samples", time_s[0], time_s.len()),
+            NotForward::Stands => {
+                format!("the same time, {} s, in all {} samples", nine_decimals(time_s[0]), time_s.len())
+            }
             NotForward::Falls { falling, steps, first: [from, to] } => format!(
                 "times that fall in {falling} of {steps} steps, first from {} s to {} s after {} samples",
-                time_s[from],
-                time_s[to],
+                nine_decimals(time_s[from]),
+                nine_decimals(time_s[to]),
                 from + 1
             ),
         };
@@ -146,8 +149,8 @@ fn check_clock(time_s: &[f64]) -> Result<(), LogError> {
     let Some(at) = clock::restarts(time_s).first().copied() else { return Ok(()) };
     let found = format!(
         "a clock that starts again: after {at} samples the time goes back from {} s to {} s",
-        time_s[at - 1],
-        time_s[at]
+        nine_decimals(time_s[at - 1]),
+        nine_decimals(time_s[at])
     );
     let advice = "the log holds several recordings: cut it there";
     Err(LogError::unexpected(Spot::Whole, "one clock", found, advice))

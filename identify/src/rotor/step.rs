@@ -1,5 +1,6 @@
 //! Steps of the command, cut out of a log.
 
+use diagnostics::digits;
 use diagnostics::unit::SPEED;
 use serde::Serialize;
 
@@ -147,7 +148,12 @@ impl<'s> Log<'s> {
             "at least {ROWS_BEFORE_MIN} row in the {before_s} s before a step and {ROWS_AFTER_MIN} in the {after_s} s after"
         );
         let advice = "correct the unit of `time`, or raise `before_s` and `after_s`";
-        Err(RotorError::too_little(&self.name, expected, format!("one in {} s", self.period_s), advice))
+        Err(RotorError::too_little(
+            &self.name,
+            expected,
+            format!("one in {} s", digits(self.period_s)),
+            advice,
+        ))
     }
 
     /// True if the command of `row` differs from that of the row before.

@@ -10,7 +10,7 @@ use crate::supervisor::replacement::{next_take_over, take_over_stride};
 use bus::Registration;
 use bus::plan::{INPUTS_RESERVED, NodePlan, Plan};
 use bus::ports::{Inputs, PortSpec};
-use diagnostics::Diagnostic;
+use diagnostics::{Diagnostic, nine_decimals};
 use inputs::InputFiles;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -360,7 +360,8 @@ impl Run<'_> {
                     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
                     return Ok((ticks.round() as u32, time.span()));
                 }
-                let message = format!("`at_s` is {} s, which is {ticks} ticks", time.get_ref());
+                let message =
+                    format!("`at_s` is {} s, which is {} ticks", time.get_ref(), nine_decimals(ticks));
                 Err(at(time.span(), &message, "give the time of a tick"))
             }
             (None, None) => Err(at(swap.span(), "the swap has no time", "add at_tick = … or at_s = …")),
