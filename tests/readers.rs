@@ -100,10 +100,15 @@ fn others_decode_the_frames_and_standard_messages_of_ten_vehicles() {
     for part in frames.into_iter().chain(headers.iter().map(String::as_str)).chain(topics) {
         assert!(text.contains(part), "no {part}");
     }
-    for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_foxglove.mjs"] {
+    for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_plotjuggler.py", "read_foxglove.mjs"] {
         let output = read(&readers, script, &recording, &lines).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
+}
+
+#[test]
+fn the_parser_of_plotjuggler_decodes_the_same_values() {
+    check("read_plotjuggler.py");
 }
 
 #[test]
