@@ -100,9 +100,48 @@ fn others_decode_the_frames_and_standard_messages_of_ten_vehicles() {
     for part in frames.into_iter().chain(headers.iter().map(String::as_str)).chain(topics) {
         assert!(text.contains(part), "no {part}");
     }
+    decode_the_same(&readers, &recording, &lines);
+}
+
+/// The poses of a path are the references that are sent at their times.
+#[test]
+fn others_decode_the_path_of_a_trajectory() {
+    let Some(readers) = readers() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, lines) = (folder.path().join("path.mcap"), folder.path().join("path.jsonl"));
+    let manifest = Path::new(ROOT).join("manifests/figure-eight.toml");
+    let path = "process.trajectory.outputs.path={ every_ticks = 500 }";
+    let mut run = Command::new(HUMMINGBUS);
+    run.arg("run").arg(&manifest).args(["--set", "run.duration_s=3.2", "--set", path]);
+    run.arg("--record").arg(&recording);
+    // Whether it passes does not matter: it is cut short.
+    assert!(matches!(run.output().unwrap().status.code(), Some(0 | 1)));
+    let text = hummingbus(&["cat".as_ref(), recording.as_ref()]).stdout;
+    fs::write(&lines, &text).unwrap();
+    let messages: Vec<serde_json::Value> =
+        String::from_utf8(text).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |topic: &'static str| messages.iter().filter(move |message| message["topic"] == topic);
+    let paths: Vec<_> = of("/trajectory/path").map(|message| &message["fields"]).collect();
+    assert!(paths.len() > 5, "{} paths", paths.len());
+    // 2.8 s after the first: the figure eight begins at 2 s.
+    let stamp = |part: &str| &paths[0][format!("poses[28].header.stamp.{part}")];
+    let is_then = |reference: &&serde_json::Value| {
+        ["sec", "nanosec"].into_iter().all(|part| &reference["fields"][format!("stamp.{part}")] == stamp(part))
+    };
+    let reference = &of("/trajectory/reference").find(is_then).unwrap()["fields"];
+    for axis in ["x", "y", "z"] {
+        let asked = &reference[format!("position.{axis}")];
+        assert_eq!(&paths[0][format!("poses[28].pose.position.{axis}")], asked, "{axis}");
+    }
+    assert_ne!(paths[0]["poses[28].pose.position.x"], paths[0]["poses[0].pose.position.x"]);
+    decode_the_same(&readers, &recording, &lines);
+}
+
+/// Requires of every reader that it finds in a recording the `lines` of `cat`.
+fn decode_the_same(readers: &Path, recording: &Path, lines: &Path) {
     for script in ["read_mcap_ros2.py", "read_rosbags.py", "read_plotjuggler.py", "read_foxglove.mjs"] {
-        let output = read(&readers, script, &recording, &lines).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = read(readers, script, recording, lines).output().unwrap();
+        assert!(output.status.success(), "{script}: {}", String::from_utf8_lossy(&output.stderr));
     }
 }
 

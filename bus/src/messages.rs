@@ -13,11 +13,13 @@ use crate::schema::{FieldType, Kind};
 use crate::{Bounded, Message};
 
 mod control;
+mod path;
 mod sensing;
 mod standard;
 mod transform;
 
 pub use control::{ControlStatus, RC_CHANNELS_MAX, RcChannels, Reference};
+pub use path::PlannedPath;
 pub use sensing::{
     Barometer, Battery, BodyStates, Clearance, Contact, Gps, Innovation, Magnetometer, Mocap, Ranges,
     RotorSpeeds, StateEstimate, Traffic, WallEstimate,

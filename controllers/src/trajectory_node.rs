@@ -1,10 +1,10 @@
 //! The trajectory node: publishes the points of a trajectory, with the derivatives that controllers feed forward.
 
-use crate::trajectory::{Start, Trajectory};
+use crate::trajectory::{Point, Start, Trajectory};
 use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
-use bus::messages::Reference;
+use bus::messages::{Orientation, PlannedPath, Pose, Reference, Time};
 use diagnostics::ParameterError;
 
 /// Parameters of the trajectory.
@@ -37,7 +37,12 @@ fn warn_of_late(trajectory: &Trajectory, run: &NodeContext<'_>) {
 pub struct Outputs {
     /// Point of the trajectory.
     pub reference: Reference,
+    /// Poses of the coming 9.9 s, one each 0.1 s, as `nav_msgs/Path`.
+    pub path: Option<PlannedPath>,
 }
+
+/// Time between two poses of the path.
+const POSE_EVERY_NS: u64 = 100_000_000;
 
 /// The component `trajectory`.
 ///
@@ -52,7 +57,33 @@ pub struct Outputs {
 /// assert_eq!((reference.position.z, reference.velocity.x), (1.0, 0.0), "it starts from rest");
 /// ```
 #[derive(Debug)]
-pub struct TrajectoryNode(Trajectory);
+pub struct TrajectoryNode {
+    trajectory: Trajectory,
+    /// True if the manifest names the output `path`, which takes as long as 100 references.
+    has_path: bool,
+}
+
+impl TrajectoryNode {
+    fn at(&self, time_ns: u64) -> Point {
+        self.trajectory.at(time_ns as f64 * 1e-9)
+    }
+
+    /// The course from `now_ns` on.
+    fn path(&self, now_ns: u64) -> PlannedPath {
+        let times_ns = (0..PlannedPath::POSES_MAX as u64).map(|index| now_ns + index * POSE_EVERY_NS);
+        PlannedPath::new(times_ns.map(|time_ns| (Time::from_ns(time_ns), pose(&self.at(time_ns)))))
+    }
+}
+
+/// The pose of a level vehicle at `point`.
+fn pose(point: &Point) -> Pose {
+    let [x, y, z] = <[f64; 3]>::from(point.path_W[0]);
+    let (sine, cosine) = libm::sincos(0.5 * point.yaw_rad);
+    Pose {
+        position: bus::messages::Point { x, y, z },
+        orientation: Orientation { x: 0.0, y: 0.0, z: sine, w: cosine },
+    }
+}
 
 impl Component for TrajectoryNode {
     const INFO: Info = Info::new(
@@ -70,12 +101,49 @@ impl Component for TrajectoryNode {
         let trajectory = Trajectory::read(&parameters.segments, start)?;
         trajectory.require_flyable()?;
         warn_of_late(&trajectory, context);
-        Ok(Self(trajectory))
+        Ok(Self { trajectory, has_path: context.has("path") })
     }
 
     fn initial(&self) {}
 
     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
-        Ok(Outputs { reference: Reference::from(&self.0.at(context.time_ns() as f64 * 1e-9)) })
+        let now_ns = context.time_ns();
+        let path = self.has_path.then(|| self.path(now_ns));
+        Ok(Outputs { reference: Reference::from(&self.at(now_ns)), path })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bus::Harness;
+    use serde_json::json;
+
+    #[test]
+    fn the_path_is_that_of_the_coming_references() {
+        let circle = json!({
+            "kind": "circle", "radius_m": 2.0, "speed_m_s": 2.0, "laps": 2, "ramp_s": 2.0, "yaw_deg": 90.0
+        });
+        let parameters =
+            Parameters { initial_position_m: [0.0, 0.0, 1.0], initial_yaw_deg: 0.0, segments: vec![circle] };
+        let context = NodeContext::new("trajectory", &[]).naming(&["path"]);
+        let mut node = Harness::<TrajectoryNode>::in_context(parameters, &context).unwrap();
+        let path = node.step(()).unwrap().path.unwrap();
+        assert_eq!(path.poses().count(), PlannedPath::POSES_MAX);
+        let (stamp, pose) = path.poses().nth(30).unwrap();
+        let (position, turn) = (pose.position, pose.orientation);
+        assert!(position.y > 0.1 && turn.z > 0.1, "{pose:?}");
+        // At 1 kHz, the second step is that at 1 ms.
+        let later = (0..3000).map(|_| node.step(()).unwrap().reference).last().unwrap();
+        assert_eq!(stamp, Time { sec: 3, nanosec: 0 });
+        assert_eq!([position.x, position.y, position.z], <[f64; 3]>::from(later.position));
+        assert!((2.0 * libm::atan2(turn.z, turn.w) - later.yaw).abs() < 1e-12, "{later:?}");
+    }
+
+    #[test]
+    fn no_path_is_computed_that_the_manifest_does_not_name() {
+        let mut node =
+            Harness::<TrajectoryNode>::from_json(&json!({ "initial_position_m": [0.0, 0.0, 1.0] })).unwrap();
+        assert!(node.step(()).unwrap().path.is_none());
     }
 }

@@ -141,7 +141,7 @@ fn schema_prints_every_message_with_units_frames_and_hash() {
     }
     ended.prints(&["geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry"]);
     ended.prints(&["sensor_msgs/msg/Imu", "sensor_msgs/msg/Range", "actuator_msgs/msg/Actuators"]);
-    ended.prints(&["sensor_msgs/msg/LaserScan"]);
+    ended.prints(&["sensor_msgs/msg/LaserScan", "nav_msgs/msg/Path"]);
 }
 
 #[test]
