@@ -126,7 +126,9 @@ fn others_decode_the_path_of_a_trajectory() {
     // 2.8 s after the first: the figure eight begins at 2 s.
     let stamp = |part: &str| &paths[0][format!("poses[28].header.stamp.{part}")];
     let is_then = |reference: &&serde_json::Value| {
-        ["sec", "nanosec"].into_iter().all(|part| &reference["fields"][format!("stamp.{part}")] == stamp(part))
+        ["sec", "nanosec"]
+            .into_iter()
+            .all(|part| &reference["fields"][format!("stamp.{part}")] == stamp(part))
     };
     let reference = &of("/trajectory/reference").find(is_then).unwrap()["fields"];
     for axis in ["x", "y", "z"] {
