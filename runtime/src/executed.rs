@@ -1,34 +1,55 @@
-//! The files that the commands of a run were first started from: a command opens its program itself, and a process that is started
-//! later may get another one.
+//! The files that the words of a run's commands name: a command opens its program and its scripts itself, and a process that is
+//! started later may get other ones.
 
 use crate::program::{Executable, Program};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
 use std::io::{self, Seek as _};
 use std::os::unix::fs::MetadataExt as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The files by their paths, as they were at the first start.
+/// Name of the attachment that lists the files of a run's commands.
+pub const RECORD: &str = "programs.toml";
+
+/// The files by their paths, as they were at the first look.
 #[derive(Debug, Default)]
-pub struct Executed(BTreeMap<String, Version>);
+pub struct Executed(BTreeMap<PathBuf, Version>);
 
 /// A file, kept open: once another one takes its place, it can still be compared with that one.
 #[derive(Debug)]
 struct Version {
     file: File,
     state: State,
-    /// SHA-256 of its bytes at the first start. Only of a file of at most [`DIGESTED_BYTES`].
+    /// SHA-256 of its bytes at the first look. Only of a file of at most [`DIGESTED_BYTES`].
     digest: Option<String>,
 }
 
 /// Device, number, length and time of the last writing. It tells versions apart without reading them.
 type State = (u64, u64, u64, i64, i64);
 
-/// Largest file that is read at its first start, in bytes. A larger one is seldom a script, and the kernel lets nobody write to another program
-/// while a process executes it.
-const DIGESTED_BYTES: u64 = 4 * 1024 * 1024;
+/// Largest file that is read at the first look, in bytes: no start of a run waits for one that is much larger. Such a file is seldom a
+/// script, and the kernel lets nobody write to another program while a process executes it.
+const DIGESTED_BYTES: u64 = 64 * 1024 * 1024;
 
-/// A program, compared with the one that was first started.
+/// The attachment [`RECORD`].
+#[derive(Serialize)]
+struct Record<'a> {
+    program: Vec<Entry<'a>>,
+}
+
+/// A file of a command.
+#[derive(PartialEq, Serialize)]
+struct Entry<'a> {
+    process: &'a str,
+    /// The word of the manifest that names it.
+    file: &'a str,
+    bytes: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sha256: Option<&'a str>,
+}
+
+/// A file, compared with the one of the first look.
 #[derive(Debug, PartialEq)]
 enum Comparison {
     Same,
@@ -89,39 +110,160 @@ impl Version {
     }
 }
 
+/// The words of the command of `program` as the manifest states them, each with the path of the file that it may name. The process
+/// looks for it in its working directory.
+fn words(program: &Program) -> impl Iterator<Item = (&str, PathBuf)> {
+    let words: &[String] = match &program.executable {
+        Executable::Command(words) => words,
+        Executable::Component(_) | Executable::Program(_) => &[],
+    };
+    let folder = program.working_directory.as_deref().unwrap_or(Path::new(""));
+    words.iter().enumerate().map(move |(index, word)| {
+        let stated = if index == 0 { &program.first_word } else { word };
+        (stated.as_str(), folder.join(word))
+    })
+}
+
 impl Executed {
-    /// Notes the program that process `name` is about to execute. Returns a warning if it is another one than at its first start, or may be.
-    pub fn note(&mut self, name: &str, program: &Program) -> Option<String> {
-        let Executable::Command(words) = &program.executable else { return None };
-        let path = words.first()?;
-        let found = Version::at(path.as_ref())?;
+    /// Notes the files of `programs`, with which a run begins. Returns a warning for each that has changed since the run began
+    /// before, if it has gone back. They count as they are now.
+    pub fn begin(&mut self, programs: &[(&str, &Program)]) -> Vec<String> {
+        let warnings = self.note_all(programs);
+        if !warnings.is_empty() {
+            self.0.clear();
+            self.note_all(programs);
+        }
+        warnings
+    }
+
+    fn note_all(&mut self, programs: &[(&str, &Program)]) -> Vec<String> {
+        programs.iter().flat_map(|(name, program)| self.note(name, program)).collect()
+    }
+
+    /// Notes the files that the command of process `name`, which is about to start, names. Returns a warning for each that is another one
+    /// than at the first look, or may be.
+    pub fn note(&mut self, name: &str, program: &Program) -> Vec<String> {
+        words(program).filter_map(|(_, path)| self.note_file(name, &path)).collect()
+    }
+
+    fn note_file(&mut self, name: &str, path: &Path) -> Option<String> {
+        let found = Version::at(path)?;
         let Some(first) = self.0.get(path) else {
-            self.0.insert(path.clone(), found.digested());
+            self.0.insert(path.to_owned(), found.digested());
             return None;
         };
         let what = match first.compare(&found) {
             Comparison::Same => return None,
-            Comparison::Changed => "has changed since the run first started it",
-            Comparison::Unknown => "was written again since the run first started it, and may have changed",
+            Comparison::Changed => "has changed since the run first read it",
+            Comparison::Unknown => "was written again since the run first read it, and may have changed",
         };
-        Some(format!("warning: process `{name}`: {path} {what}; the process is started from the new file"))
+        let path = path.display();
+        Some(format!(
+            "warning: process `{name}`: {path} {what}; the process that starts now gets the new file"
+        ))
+    }
+
+    /// Text of the attachment that lists the noted files of `programs`, in their order; `None` if there are none. It has no times and no
+    /// paths but those that the manifest states, so that two runs of the same files have the same text.
+    ///
+    /// # Errors
+    /// If it cannot be written as TOML.
+    pub fn record(&self, programs: &[(&str, &Program)]) -> Result<Option<String>, toml::ser::Error> {
+        let mut entries = Vec::new();
+        for &(process, program) in programs {
+            for (file, path) in words(program) {
+                let Some(version) = self.0.get(&path) else { continue };
+                let entry =
+                    Entry { process, file, bytes: version.bytes(), sha256: version.digest.as_deref() };
+                // A swap may name the program of its process again.
+                if !entries.contains(&entry) {
+                    entries.push(entry);
+                }
+            }
+        }
+        if entries.is_empty() {
+            return Ok(None);
+        }
+        let head = "# Files that the words of commands name, as they were when the run began. Those of more than 64 MiB have no SHA-256.\n";
+        toml::to_string(&Record { program: entries }).map(|text| Some(format!("{head}{text}")))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{DIGESTED_BYTES, Executable, Executed, Program};
+    use inputs::sha256;
     use std::fs::{self, File};
     use std::time::{Duration, SystemTime};
+
+    /// A program whose manifest states the same words, the first with `bin/` in the place of its folder.
+    fn command<const N: usize>(words: [&str; N]) -> Program {
+        let name = words[0].rsplit('/').next().unwrap_or_default();
+        let executable = Executable::Command(words.map(str::to_owned).into());
+        Program { executable, first_word: format!("bin/{name}"), ..Program::unknown() }
+    }
+
+    #[test]
+    fn every_word_that_names_a_file_is_looked_at_in_the_working_directory() {
+        let folder = tempfile::tempdir().unwrap();
+        let interpreter = folder.path().join("python3").to_string_lossy().into_owned();
+        fs::write(&interpreter, "an interpreter").unwrap();
+        fs::create_dir(folder.path().join("laws")).unwrap();
+        let law = folder.path().join("law.py");
+        fs::write(&law, "old").unwrap();
+        let program = command([interpreter.as_str(), "-u", "law.py", "laws", "missing.py", ""]);
+        let program = Program { working_directory: Some(folder.path().to_owned()), ..program };
+        let mut executed = Executed::default();
+        assert!(executed.begin(&[("pilot", &program)]).is_empty());
+        assert!(executed.note("pilot", &program).is_empty());
+        fs::write(&law, "newer").unwrap();
+        let told = executed.note("pilot", &program);
+        let expected = format!("process `pilot`: {} has changed since the run first read it", law.display());
+        assert!(told.len() == 1 && told[0].contains(&expected), "{told:?}");
+        // A run that goes back begins with the new file, and says so once.
+        assert_eq!(executed.begin(&[("pilot", &program)]), told);
+        assert!(executed.note("pilot", &program).is_empty());
+    }
+
+    #[test]
+    fn a_record_has_the_words_of_the_manifest_and_the_bytes_of_the_start() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+        fs::write(path("node"), "program").unwrap();
+        fs::write(path("law.py"), "old").unwrap();
+        File::create(path("large")).unwrap().set_len(DIGESTED_BYTES + 1).unwrap();
+        let program = Program {
+            working_directory: Some(folder.path().to_owned()),
+            ..command([path("node").as_str(), "law.py", "--fast", "large"])
+        };
+        let programs = [("pilot", &program), ("pilot", &program)];
+        let mut executed = Executed::default();
+        assert_eq!(executed.record(&programs).unwrap(), None, "nothing was looked at");
+        executed.begin(&programs);
+        fs::write(path("law.py"), "new").unwrap();
+        let text = executed.record(&programs).unwrap().unwrap();
+        assert!(!text.contains(&*folder.path().to_string_lossy()), "{text}");
+        let record: toml::Table = text.parse().unwrap();
+        let expected = format!(
+            "[[program]]\nprocess = 'pilot'\nfile = 'bin/node'\nbytes = 7\nsha256 = '{}'\n\
+             [[program]]\nprocess = 'pilot'\nfile = 'law.py'\nbytes = 3\nsha256 = '{}'\n\
+             [[program]]\nprocess = 'pilot'\nfile = 'large'\nbytes = {}\n",
+            sha256(b"program"),
+            sha256(b"old"),
+            DIGESTED_BYTES + 1
+        );
+        assert_eq!(record, expected.parse::<toml::Table>().unwrap());
+        let kind = Program { executable: Executable::Command(Vec::new()), ..Program::unknown() };
+        assert_eq!(executed.record(&[("imu", &kind)]).unwrap(), None);
+    }
 
     #[test]
     fn another_program_at_the_same_path_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node");
-        let words = vec![path.to_string_lossy().into_owned(), "--fast".to_owned()];
-        let program = Program { executable: Executable::Command(words), ..Program::unknown() };
+        let program = command([path.to_string_lossy().as_ref(), "--fast"]);
         let mut executed = Executed::default();
-        let mut is_told = || executed.note("imu", &program).is_some();
+        let mut is_told = || !executed.note("imu", &program).is_empty();
         assert!(!is_told(), "it is missing, which the start tells");
         fs::write(&path, "old").unwrap();
         assert!(!is_told() && !is_told());
@@ -145,20 +287,20 @@ mod tests {
     fn a_program_that_is_written_in_place_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node").to_string_lossy().into_owned();
-        let program = Program { executable: Executable::Command(vec![path.clone()]), ..Program::unknown() };
+        let program = command([path.as_str()]);
         let mut executed = Executed::default();
         fs::write(&path, "old").unwrap();
-        assert_eq!(executed.note("imu", &program), None);
+        assert!(executed.note("imu", &program).is_empty());
         fs::write(&path, "longer").unwrap();
-        let told = executed.note("imu", &program).unwrap();
+        let told = executed.note("imu", &program).concat();
         assert!(told.contains(&format!("process `imu`: {path} has changed")), "{told}");
         fs::write(&path, "bad").unwrap();
         written_at(&path, 2);
-        let told = executed.note("imu", &program).unwrap();
+        let told = executed.note("imu", &program).concat();
         assert!(told.contains("has changed"), "as long as the first: {told}");
         fs::write(&path, "old").unwrap();
         written_at(&path, 1);
-        assert_eq!(executed.note("imu", &program), None, "the same bytes");
+        assert!(executed.note("imu", &program).is_empty(), "the same bytes");
     }
 
     /// The time of the last writing becomes `s` after 1970.
@@ -171,12 +313,12 @@ mod tests {
     fn a_large_program_whose_first_bytes_are_gone_may_have_changed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node").to_string_lossy().into_owned();
-        let program = Program { executable: Executable::Command(vec![path.clone()]), ..Program::unknown() };
+        let program = command([path.as_str()]);
         let mut executed = Executed::default();
         File::create(&path).unwrap().set_len(DIGESTED_BYTES + 1).unwrap();
-        assert_eq!(executed.note("imu", &program), None);
+        assert!(executed.note("imu", &program).is_empty());
         written_at(&path, 1);
-        let told = executed.note("imu", &program).unwrap();
+        let told = executed.note("imu", &program).concat();
         assert!(told.contains("was written again") && told.contains("may have changed"), "{told}");
     }
 }

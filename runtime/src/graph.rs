@@ -100,6 +100,13 @@ impl Graph {
         self.programs.iter().map(Program::component)
     }
 
+    /// Programs that take part in the ticks, with the names of their nodes: those of the plan, then those of backups.
+    pub(crate) fn ticking_programs(&self) -> Vec<(&str, &Program)> {
+        let first = self.plan.nodes.iter().map(|node| &*node.name).zip(&self.programs);
+        let backups = self.backups.iter().map(|backup| (&*backup.plan.name, &backup.program));
+        first.chain(backups).collect()
+    }
+
     /// Checks `manifest` and resolves it. Files that it names are read from the disk, now and never again.
     ///
     /// # Errors

@@ -66,8 +66,8 @@ pub struct HostWorld<'a> {
     pub instances: &'a Instances,
     /// The processes of groups that were started, by the groups' names.
     pub groups: BTreeMap<String, Rc<RefCell<SharedBody>>>,
-    /// The programs of commands that were started.
-    pub executed: Executed,
+    /// The files of the run's commands.
+    pub executed: &'a mut Executed,
     /// Warnings about started processes, until they are taken.
     pub warnings: Vec<String>,
 }
@@ -193,7 +193,7 @@ impl World for HostWorld<'_> {
     }
 
     fn start(&mut self, name: &str, role: Role, program: Option<&Program>) -> Result<HostBody> {
-        self.warnings.extend(program.and_then(|program| self.executed.note(name, program)));
+        self.warnings.extend(program.into_iter().flat_map(|program| self.executed.note(name, program)));
         let notify = match (role, program) {
             (Role::Sidecar { index, .. }, Some(program)) if program.ready == Readiness::Notify => {
                 Some(self.notify_socket(name, index)?)

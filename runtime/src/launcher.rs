@@ -6,7 +6,7 @@ use crate::ctl::control::ControlServer;
 use crate::ctl::{Asked, Remote};
 use crate::descendants::{Descendants, Place};
 use crate::event::{RunEvent, StopToken};
-use crate::executed::Executed;
+use crate::executed::{self, Executed};
 use crate::flight::Flight;
 use crate::graph::Graph;
 use crate::host::Host;
@@ -356,12 +356,22 @@ impl<'a> Launcher<'a> {
         let mut run_dir = RunDir::create(&manifest.path)?;
         let run_id = run_dir.run_id().to_owned();
         let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
-        let (rewinds, files) = (Rewinds::default(), WrittenFiles::default());
+        let (rewinds, files, mut executed) =
+            (Rewinds::default(), WrittenFiles::default(), Executed::default());
         loop {
             let number = rewinds.done().len() + 1;
             rewinds.keep_at(outputs.place_aside(number));
-            let flown =
-                self.launch_in(&run_dir, &place, manifest, graph, outputs, &rewinds, &files, &mut *on);
+            let flown = self.launch_in(
+                &run_dir,
+                &place,
+                manifest,
+                graph,
+                outputs,
+                &rewinds,
+                &files,
+                &mut executed,
+                &mut *on,
+            );
             let flown = flown.map_err(|error| run_dir.blame_room(error));
             run_dir.remove().iter().for_each(|left| on(RunEvent::Note(left)));
             let outcome = flown?;
@@ -386,6 +396,7 @@ impl<'a> Launcher<'a> {
         outputs: &mut Outputs,
         rewinds: &Rewinds,
         files: &WrittenFiles,
+        executed: &mut Executed,
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> anyhow::Result<Outcome> {
         // Before anything is touched that an earlier run left.
@@ -396,7 +407,14 @@ impl<'a> Launcher<'a> {
         if let Some(kept) = outputs.kept() {
             on(RunEvent::Note(&format!("what an earlier run left unfinished is kept as {}", kept.display())));
         }
-        prepare(manifest, graph, outputs.partial(), run_dir, rewinds.mark())?;
+        let programs = graph.ticking_programs();
+        let sidecars = graph.sidecars.iter().map(|(name, program)| (&**name, program));
+        let all: Vec<_> = programs.iter().copied().chain(sidecars).collect();
+        executed.begin(&all).iter().for_each(|warning| on(RunEvent::Note(warning)));
+        let mark = rewinds.mark().map(|mark| (rewind::MARK, mark));
+        let record = executed.record(&programs)?.map(|record| (executed::RECORD, record));
+        let written: Vec<_> = mark.into_iter().chain(record).collect();
+        prepare(manifest, graph, outputs.partial(), run_dir, written)?;
         graph.plan.run_id = run_dir.run_id().to_owned();
         graph.plan.store(run_dir.path())?;
         if let Some(parts) = &graph.from {
@@ -407,7 +425,7 @@ impl<'a> Launcher<'a> {
         let instances = &Instances::default();
         let writer = Writer { manifest, graph, run_dir: run_path, stem, files, instances };
         let mut checkpoints = Collector::new(writer, self.host != Host::InProcess);
-        let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, on);
+        let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, executed, on);
         // A user goes back to those of a run that broke.
         let (written, missed) = checkpoints.finish();
         if flown.is_err() || rewinds.is_asked() {
@@ -434,6 +452,7 @@ impl<'a> Launcher<'a> {
         graph: &Graph,
         checkpoints: &mut Collector<'_>,
         rewinds: &Rewinds,
+        executed: &mut Executed,
         on: &mut dyn FnMut(RunEvent<'_>),
     ) -> anyhow::Result<Outcome> {
         if self.host == Host::InProcess {
@@ -472,7 +491,7 @@ impl<'a> Launcher<'a> {
             instances: checkpoints.writer.instances,
             sockets: BTreeMap::new(),
             groups: BTreeMap::new(),
-            executed: Executed::default(),
+            executed,
             warnings: Vec::new(),
         };
         let mut on = |event: RunEvent<'_>| {
@@ -497,13 +516,13 @@ impl<'a> Launcher<'a> {
 }
 
 /// Puts the files that the nodes read into the run directory. Gives the recorders their attachments: the manifest,
-/// its includes, the models, and the `mark` of a run that went back.
+/// its includes, the models, and the texts that the launcher has `written`, with their names.
 fn prepare(
     manifest: &Manifest,
     graph: &mut Graph,
     recording: Option<&Path>,
     run_dir: &RunDir,
-    mark: Option<String>,
+    written: Vec<(&str, String)>,
 ) -> anyhow::Result<()> {
     let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
     let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
@@ -519,9 +538,9 @@ fn prepare(
         attachments.push(attachment(path, path));
         files.bytes(path).with_context(|| format!("cannot attach {}", path.display()))?;
     }
-    if let Some(mark) = mark {
-        let key = run_dir.path().join(rewind::MARK);
-        files.keep(&key, mark.into_bytes());
+    for (name, text) in written {
+        let key = run_dir.path().join(name);
+        files.keep(&key, text.into_bytes());
         attachments.push(attachment(&key, &key));
         files.bytes(&key)?;
     }

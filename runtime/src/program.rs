@@ -69,6 +69,8 @@ pub enum Readiness {
 pub struct Program {
     /// Its executable.
     pub executable: Executable,
+    /// First word of its command as the manifest states it: the word in `executable` is a path of this host. Empty for a kind.
+    pub first_word: String,
     /// Environment variables beside the launcher's own.
     pub environment: BTreeMap<String, String>,
     /// Working directory; the launcher's where absent.
@@ -94,6 +96,7 @@ impl Program {
     pub(crate) fn unknown() -> Self {
         Self {
             executable: Executable::Command(Vec::new()),
+            first_word: String::new(),
             environment: BTreeMap::new(),
             working_directory: None,
             nice: None,

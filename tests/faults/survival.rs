@@ -240,7 +240,7 @@ fn fly_rebuilt(rebuilt: impl Fn(&str) -> String, goes_on: bool) -> (Ended, Strin
         watched.control.set_hold_tick(u32::MAX);
     }
     let warning =
-        format!("warning: process `saboteur`: {program} has changed since the run first started it");
+        format!("warning: process `saboteur`: {program} has changed since the run first read it");
     (launch.end(), warning)
 }
 

@@ -126,8 +126,10 @@ pub fn program(
     let help = "no process computes in no time: give milliseconds of host time, such as 20000";
     let watchdog = manifest.within("watchdog_ms_host", &process.watchdog_ms_host, 1..=u64::MAX, help)?;
     let (nice, priority) = (&process.nice, &process.realtime_priority);
+    let first_word = process.command.as_ref().and_then(|command| command.get_ref().first().cloned());
     Ok(Program {
         executable: executable(manifest, name, process, &environment)?,
+        first_word: first_word.unwrap_or_default(),
         environment,
         working_directory: working_directory(manifest, process)?,
         nice: manifest.within("nice", nice, -20..=19, "it goes from -20 to 19")?,

@@ -16,6 +16,7 @@ pub(super) const WATCHDOG: Duration = Duration::from_millis(500);
 pub(super) fn program(on_exit: OnExit) -> Program {
     Program {
         executable: Executable::Command(Vec::new()),
+        first_word: String::new(),
         environment: Default::default(),
         working_directory: None,
         nice: None,
