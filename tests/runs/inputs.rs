@@ -10,6 +10,8 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
 const VEHICLE: &str = "vehicle.toml";
+/// Attachment that lists the files of commands.
+const PROGRAMS: &str = "programs.toml";
 /// The manifest's files as they lie in the repository, each with one number, and the number after an edit.
 const FILES: [(&str, &str, &str, &str); 3] = [
     ("vehicles/hummingbird.toml", VEHICLE, "mass = { value = 0.480", "mass = { value = 0.520"),
@@ -69,6 +71,7 @@ fn require_attached(recording: &str) {
         let (_, bytes) = attached.iter().find(|(attached, _)| attached == name).unwrap();
         assert!(bytes == texts(name)[0].as_bytes(), "{name} is attached as it is after the edit");
     }
+    assert!(attached.iter().all(|(name, _)| name != PROGRAMS), "there is no command");
 }
 
 /// Every process of the run edits the vehicle before it reads anything: each would find another file.
@@ -219,6 +222,49 @@ fn the_files_of_a_command_are_part_of_the_run() {
     launch.end().with_code(0);
     // The node looks at what it gets.
     place.call(&["run", &flown]).with_code(2).says(&["list.txt holds \"new\""]);
+}
+
+#[test]
+fn a_script_that_is_edited_in_flight_is_told_at_a_restart_and_the_recording_lists_the_first() {
+    use crate::nodes::{manifest, sender};
+    let place = Place::new();
+    let node = sender("reader", 1, "on_exit = \"restart\"");
+    let (head, rest) = node.split_once("command = [").unwrap();
+    let (words, rest) = rest.split_once("]\n").unwrap();
+    let (script, folder) = (format!("exec {}\n", words.replace(", ", " ")), place.path(""));
+    let node = format!("{head}command = [\"sh\", \"node.sh\"]\nworking_directory = {folder:?}\n{rest}");
+    let flown = place.write("script.toml", manifest(300, &[node]));
+    replace(&place, "node.sh", &script);
+    let mut launch = start(&place, &flown, &place.path("script.mcap"));
+    launch.hold_at(100);
+    replace(&place, "node.sh", &format!("# Edited.\n{script}"));
+    kill_process(place.process_of("reader"), Signal::KILL).unwrap();
+    launch.release();
+    let ended = launch.end().with_code(0);
+    ended.says(&["warning: process `reader`: ", "node.sh has changed since the run first read it"]);
+    assert_eq!(
+        ended.error.matches("since the run first read it").count(),
+        1,
+        "the shell is the same: {ended}"
+    );
+
+    let attached = open(&place.path("script.mcap")).attachments().unwrap();
+    let (_, record) = attached.iter().find(|(name, _)| name == PROGRAMS).unwrap();
+    let record: toml::Table = std::str::from_utf8(record).unwrap().parse().unwrap();
+    let programs = record["program"].as_array().unwrap();
+    let files = programs.iter().map(|program| program["file"].as_str().unwrap());
+    assert_eq!(files.collect::<Vec<_>>(), ["sh", "node.sh"]);
+    assert_eq!(programs[1]["sha256"].as_str().unwrap(), ::inputs::sha256(script.as_bytes()));
+    assert!(programs.iter().all(|program| program["process"].as_str() == Some("reader")), "{record}");
+
+    // Another run of the same files lists the same, and one of the edited script does not.
+    let attached_by = |recording: &str| {
+        start(&place, &flown, recording).end().with_code(0);
+        open(recording).attachments().unwrap()
+    };
+    assert!(attached_by(&place.path("edited.mcap")) != attached);
+    replace(&place, "node.sh", &script);
+    assert!(attached_by(&place.path("again.mcap")) == attached);
 }
 
 #[test]
