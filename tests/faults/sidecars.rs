@@ -79,7 +79,7 @@ fn the_first_tick_waits_for_a_sidecar_that_says_when_it_is_ready() {
     launch.release();
     // Everybody has joined, and nobody computes.
     for _ in 0..20 {
-        std::thread::sleep(std::time::Duration::from_millis(10));
+        launch.await_looks(5);
         launch.hold_at(0);
         launch.release();
     }
@@ -102,8 +102,10 @@ fn a_sidecar_starts_when_those_before_it_are_ready() {
     poll("it was not started", || exists("server").then_some(()));
     launch.hold_at(0);
     launch.release();
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    assert!(!exists("client"), "it waits");
+    // A process has its log from its start on.
+    let has_log = |name: &str| place.run_dirs()[0].join(format!("{name}.log")).exists();
+    launch.await_looks(20);
+    assert!(has_log("viewer") && !has_log("client") && !exists("client"), "it waits");
     place.write("go", "");
     launch.end().with_code(0);
     assert!(exists("client"), "it was started");
@@ -129,10 +131,15 @@ fn the_first_tick_waits_for_a_sidecar_that_is_restarted_before_it_is_ready() {
                           else touch started; exit 4; fi"
     );
     let mut launch = start(&place, &script, "ready = \"notify\"\non_exit = \"restart\"", &[]);
-    poll("it was not started", || std::fs::metadata(place.path("started")).ok());
-    std::thread::sleep(std::time::Duration::from_millis(300));
+    launch.await_said("`viewer` is restarted");
     launch.hold_at(0);
     launch.release();
+    // Everybody has joined, and nobody computes.
+    for _ in 0..20 {
+        launch.await_looks(5);
+        launch.hold_at(0);
+        launch.release();
+    }
     place.write("go", "");
     launch.end().with_code(0).says(&["process `viewer` ended with exit code 4", "`viewer` is restarted"]);
 }

@@ -119,7 +119,7 @@ fn a_second_ctrl_c_aborts_a_run_that_does_not_come_to_its_boundary() {
     launch.await_ticks(300);
     kill_process(place.process_of("plant"), Signal::STOP).unwrap();
     launch.signal(Signal::INT);
-    sleep(Duration::from_millis(300));
+    launch.await_stop_request();
     launch.signal(Signal::INT);
     launch.end().with_code(2).says(&["interrupted twice"]);
     open(&partial(&recording));

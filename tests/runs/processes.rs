@@ -1,8 +1,8 @@
 //! Processes on the host: sidecars, commands, cores, priorities and environments.
 
 use crate::nodes;
-use crate::refusals::{good, refused, refused_setting, refused_text, refused_with};
-use crate::support::{Launch, Place, repository};
+use crate::refusals::{endless, good, refused, refused_setting, refused_text, refused_with};
+use crate::support::{Launch, Place, poll, repository};
 use std::fs;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ fn a_sidecar_runs_beside_the_ticks_and_ends_with_the_run() {
         "\n[process.viewer]\nlockstep = false\ncommand = [\"${{HUMMINGBUS_UNSET:-sh}}\", \"-c\", {script:?}]\n\
          environment = {{ COLOUR = \"${{HUMMINGBUS_UNSET:-blue}}\", OUT = {out:?} }}\nworking_directory = {folder:?}\n"
     );
-    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + &sidecar;
+    let text = endless(&good()) + &sidecar;
     let path = place.write("beside.toml", text);
     place.call(&["check", &path]).with_code(0).prints(&["viewer (", "takes no part in the ticks"]);
     let mut launch = place.start(&["run", &path]);
@@ -59,20 +59,19 @@ fn files_and_variables_among_the_parameters_of_a_command_are_resolved() {
     place.call(&["run", &path, "--record", &place.path("b.mcap")]).with_code(2).says(&["No such file"]);
 }
 
-/// Looks again and again, while a long run goes on.
+/// Looks again and again, while an endless run goes on.
 fn await_it<T>(launch: &mut Launch<'_>, look: impl Fn() -> Option<T>) -> T {
-    let looks = (1..1000).find_map(|step| {
-        launch.await_ticks(50 * step);
+    poll("it does not come", || {
+        assert!(!launch.has_ended(), "the run has ended: {}", launch.errors());
         look()
-    });
-    looks.expect("it does not come")
+    })
 }
 
 #[test]
 fn a_sidecar_dies_with_a_launcher_that_is_killed() {
     let place = Place::new();
     let sidecar = "\n[process.viewer]\nlockstep = false\ncommand = [\"sleep\", \"600\"]\n";
-    let text = good().replace("duration_s = 0.1", "duration_s = 100\npace = \"realtime\"") + sidecar;
+    let text = endless(&good()) + sidecar;
     let mut launch = place.start(&["run", &place.write("beside.toml", text)]);
     // The launcher, the clock, seven nodes and the sidecar.
     await_it(&mut launch, || (place.processes().len() >= 10).then_some(()));
@@ -187,8 +186,7 @@ fn niceness_and_generation_reach_the_process() {
 
 /// Returns the result of `look` for the folder of /proc of the IMU, amid a long run of `text`.
 fn running<T>(place: &Place, text: &str, look: impl Fn(&str) -> T) -> T {
-    let text = text.replace("duration_s = 0.1", "duration_s = 60\npace = \"realtime\"");
-    let mut launch = place.start(&["run", &place.write("running.toml", text)]);
+    let mut launch = place.start(&["run", &place.write("running.toml", endless(text))]);
     launch.await_ticks(50);
     let found = look(&format!("/proc/{}", place.process_of("imu").as_raw_nonzero()));
     launch.kill();

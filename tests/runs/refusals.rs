@@ -52,6 +52,13 @@ kind = "recorder"
     )
 }
 
+/// The `text`, made of the good manifest, as that of a run at real time that lasts until it is ended.
+pub fn endless(text: &str) -> String {
+    let duration = "duration_s = 0.1";
+    assert!(text.contains(duration), "{text}");
+    text.replace(duration, "duration_s = 4000000\npace = \"realtime\"")
+}
+
 /// Refuses the good manifest with `from` replaced by `to`, at the place marked in `to`.
 #[track_caller]
 pub fn refused(from: &str, to: &str) -> Ended {

@@ -6,6 +6,8 @@ use bus::plan::Plan;
 use rustix::process::{Pid, Signal, kill_process};
 use std::cell::RefCell;
 use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -258,6 +260,23 @@ impl Launch<'_> {
         let what = format!("the run was not held at tick {ticks}");
         poll(&what, || self.control().map(|control| control.set_hold_tick(ticks)));
         poll(&what, || self.control()?.held_at().filter(|&held| held == ticks));
+    }
+
+    /// Waits until the launcher has looked at its run `count` times: in each look it answers a request of this connection.
+    pub fn await_looks(&self, count: usize) {
+        let run_dirs = self.place.run_dirs();
+        let socket = UnixStream::connect(run_dirs.first().expect("the run is up").join("ctl.sock")).unwrap();
+        socket.set_read_timeout(Some(WATCHDOG)).unwrap();
+        let mut answers = BufReader::new(&socket).lines();
+        for _ in 0..count {
+            writeln!(&socket, r#"{{"request":"status"}}"#).unwrap();
+            answers.next().expect("the run has ended").unwrap();
+        }
+    }
+
+    /// Waits until the launcher has asked the run to stop at its next boundary.
+    pub fn await_stop_request(&self) {
+        poll("no stop was requested", || self.control()?.is_stop_requested().then_some(()));
     }
 
     /// Waits until generation `generation` of node `node` computes.

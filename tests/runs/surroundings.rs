@@ -1,6 +1,6 @@
 //! Hosts that lack something: a run says what, and leaves nothing behind.
 
-use crate::refusals::good;
+use crate::refusals::{endless, good};
 use crate::skipped::{quick_or, skip};
 use crate::support::{Ended, HUMMINGBUS, Place, poll, repository};
 use rustix::process::Signal;
@@ -85,7 +85,7 @@ fn what_cannot_be_removed_is_named() {
     let sidecar = format!(
         "\n[process.viewer]\nlockstep = false\ncommand = [\"sh\", \"-c\", {script:?}]\nenvironment = {{ BUSY = {busy:?} }}\n"
     );
-    let text = good().replace("duration_s = 0.1", "duration_s = 600\npace = \"realtime\"") + &sidecar;
+    let text = endless(&good()) + &sidecar;
     let path = place.write("busy.toml", text);
     let mut command = Command::new("unshare");
     if !command.args(["--mount", "true"]).status().is_ok_and(|status| status.success()) {
@@ -109,8 +109,7 @@ fn what_cannot_be_removed_is_named() {
 fn a_recording_whose_folder_is_renamed_in_flight_is_told_with_its_place() {
     let place = Place::new();
     fs::create_dir(place.path("before")).unwrap();
-    let path =
-        place.write("long.toml", good().replace("duration_s = 0.1", "duration_s = 600\npace = \"realtime\""));
+    let path = place.write("long.toml", endless(&good()));
     let mut launch = place.start(&["run", &path, "--record", &place.path("before/a.mcap"), "--json"]);
     launch.await_ticks(100);
     fs::rename(place.path("before"), place.path("after")).unwrap();
@@ -129,7 +128,7 @@ fn a_process_that_stops_as_a_traced_one_has_not_ended() {
     let script = "import ctypes, os, signal\nctypes.CDLL(None).ptrace(0, 0, 0, 0)\nos.kill(os.getpid(), signal.SIGSTOP)";
     let sidecar =
         format!("\n[process.viewer]\nlockstep = false\ncommand = [\"python3\", \"-c\", {script:?}]\n");
-    let text = good().replace("duration_s = 0.1", "duration_s = 600\npace = \"realtime\"") + &sidecar;
+    let text = endless(&good()) + &sidecar;
     let path = place.write("traced.toml", text);
     let mut launch = place.start(&["run", &path, "--record", &place.path("a.mcap")]);
     let is_traced = |id: &str| {

@@ -221,8 +221,13 @@ impl Page {
 
 /// Arguments of a run of the hover at real time that is watched, and whose page no browser opens.
 fn watched<'a>(manifest: &'a str, recording: &'a str, duration: &'a str) -> Vec<&'a str> {
-    let pace = ["--pace", "realtime", "--set", duration, "--view", "--no-open"];
-    [&["run", manifest, "--record", recording][..], &pace].concat()
+    watched_at("realtime", manifest, recording, duration)
+}
+
+/// The same at another pace.
+fn watched_at<'a>(pace: &'a str, manifest: &'a str, recording: &'a str, duration: &'a str) -> Vec<&'a str> {
+    let args = ["run", manifest, "--record", recording, "--pace", pace, "--set", duration];
+    [&args[..], &["--view", "--no-open"]].concat()
 }
 
 #[test]
@@ -230,10 +235,11 @@ fn a_run_that_is_watched_and_steered_writes_the_same_bytes_and_ends_with_its_pag
     let place = Place::new();
     let manifest = repository("manifests/hover.toml");
     let (recording, alone) = (place.path("watched.mcap"), place.path("alone.mcap"));
-    let run = place.start(&watched(&manifest, &recording, "run.duration_s=30"));
+    // At this pace it lasts for 340 s, longer than the watchdog of a launch waits.
+    let run = place.start(&watched_at("0.05", &manifest, &recording, "run.duration_s=17"));
     let mut page = Page::of(&run);
-    let event = page.await_event(|event| event["run"]["tick"].as_u64() > Some(100));
-    assert_eq!((&event["run"]["pace"], &event["run"]["end_tick"]), (&json!("realtime"), &json!(30_000)));
+    let event = page.await_event(|event| event["run"]["tick"].as_u64() > Some(20));
+    assert_eq!((&event["run"]["pace"], &event["run"]["end_tick"]), (&json!("0.05"), &json!(17_000)));
     let held = page.done(&json!({ "request": "pause" }));
     assert_eq!(page.done(&json!({ "request": "step", "ticks": 7 })), held + 7);
     // An event before may tell of the pause.
@@ -251,7 +257,7 @@ fn a_run_that_is_watched_and_steered_writes_the_same_bytes_and_ends_with_its_pag
     drop(page);
     let ended = run.end().with_code(0);
     assert!(ended.output.contains("view"), "the summary is printed: {ended}");
-    place.call(&["run", &manifest, "--record", &alone, "--set", "run.duration_s=30"]).with_code(0);
+    place.call(&["run", &manifest, "--record", &alone, "--set", "run.duration_s=17"]).with_code(0);
     require_same(&std::fs::read(alone).unwrap(), &recording);
 }
 
