@@ -261,7 +261,7 @@ mod tests {
     fn another_program_at_the_same_path_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node");
-        let program = command([path.to_string_lossy().as_ref(), "--fast"]);
+        let program = command([&*path.to_string_lossy(), "--fast"]);
         let mut executed = Executed::default();
         let mut is_told = || !executed.note("imu", &program).is_empty();
         assert!(!is_told(), "it is missing, which the start tells");

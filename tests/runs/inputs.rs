@@ -255,7 +255,7 @@ fn a_script_that_is_edited_in_flight_is_told_at_a_restart_and_the_recording_list
     let files = programs.iter().map(|program| program["file"].as_str().unwrap());
     assert_eq!(files.collect::<Vec<_>>(), ["sh", "node.sh"]);
     assert_eq!(programs[1]["sha256"].as_str().unwrap(), ::inputs::sha256(script.as_bytes()));
-    assert!(programs.iter().all(|program| program["process"].as_str() == Some("reader")), "{record}");
+    assert!(programs.iter().all(|program| program["process"].as_str() == Some("reader")), "{record:?}");
 
     // Another run of the same files lists the same, and one of the edited script does not.
     let attached_by = |recording: &str| {

@@ -262,7 +262,8 @@ impl Launch<'_> {
         poll(&what, || self.control()?.held_at().filter(|&held| held == ticks));
     }
 
-    /// Waits until the launcher has looked at its run `count` times: in each look it answers a request of this connection.
+    /// Waits while the launcher answers `count` requests, one after the other. It answers in its looks at the run, so that it has looked
+    /// about as often.
     pub fn await_looks(&self, count: usize) {
         let run_dirs = self.place.run_dirs();
         let socket = UnixStream::connect(run_dirs.first().expect("the run is up").join("ctl.sock")).unwrap();
