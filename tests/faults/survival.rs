@@ -239,8 +239,7 @@ fn fly_rebuilt(rebuilt: impl Fn(&str) -> String, goes_on: bool) -> (Ended, Strin
         watched.await_epoch(epoch + 1);
         watched.control.set_hold_tick(u32::MAX);
     }
-    let warning =
-        format!("warning: process `saboteur`: {program} has changed since the run first read it");
+    let warning = format!("warning: process `saboteur`: {program} has changed since the run first read it");
     (launch.end(), warning)
 }
 
