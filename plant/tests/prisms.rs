@@ -3,7 +3,7 @@
 
 use crate::common;
 use common::parts::{Prism, body, given, keys};
-use common::{G_M_S2, TICK_S, bodies_energy_J, hummingbird};
+use common::{TICK_S, bodies_energy_J, hummingbird};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;
