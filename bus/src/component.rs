@@ -143,6 +143,58 @@ pub trait Component: Sized + Send {
         state: &mut Self::State,
     ) -> Result<Self::Outputs, StepError>;
 
+    /// Returns a remark on the run for its summary, in one line, after the last tick: a fact that the user must know although
+    /// the run went on. It is asked for once, off the tick path.
+    ///
+    /// ```
+    /// use bus::component::{Component, Info, StepError};
+    /// use bus::context::{NodeContext, StepContext};
+    ///
+    /// /// Finds no root in every fourth step, and takes the nearest number.
+    /// struct Roots;
+    ///
+    /// impl Component for Roots {
+    ///     const INFO: Info = Info::new("roots", "finds roots");
+    ///     type Parameters = std::collections::BTreeMap<String, f64>;
+    ///     type Inputs<'a> = ();
+    ///     type Outputs = ();
+    ///     type State = Missed;
+    ///
+    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
+    ///         Ok(Self)
+    ///     }
+    ///
+    ///     fn initial(&self) -> Missed {
+    ///         Missed::default()
+    ///     }
+    ///
+    ///     fn step(&self, context: &StepContext<'_>, (): (), missed: &mut Missed) -> Result<(), StepError> {
+    ///         missed.steps += u64::from(context.tick() % 4 == 3);
+    ///         Ok(())
+    ///     }
+    ///
+    ///     fn remark(&self, missed: &Missed) -> Option<String> {
+    ///         (missed.steps > 0).then(|| format!("no root in {} steps", missed.steps))
+    ///     }
+    /// }
+    ///
+    /// /// Steps without a root.
+    /// #[derive(Clone, Copy, Debug, Default, bus::Message)]
+    /// #[repr(C)]
+    /// #[message(type_name = "example_msgs/msg/Missed")]
+    /// struct Missed {
+    ///     #[field(unit = "1")]
+    ///     steps: u64,
+    /// }
+    ///
+    /// let mut roots = bus::Harness::<Roots>::from_json(&serde_json::json!({})).unwrap();
+    /// (0..8).for_each(|_| roots.step(()).unwrap());
+    /// assert_eq!(roots.component().remark(&roots.state).as_deref(), Some("no root in 2 steps"));
+    /// ```
+    fn remark(&self, _state: &Self::State) -> Option<String> {
+        None
+    }
+
     /// Finishes its work after the last tick, also in a run that failed.
     ///
     /// # Errors

@@ -20,6 +20,7 @@ use crate::plan::{NodePlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
 use crate::registration::{Registration, message_of};
+use crate::remark;
 use crate::sample_ring::SampleRing;
 use crate::schema::Schema;
 use crate::tick::Tick;
@@ -112,6 +113,11 @@ impl Node {
     /// Directory of the run; `None` in memory.
     pub(crate) fn run_dir(&self) -> Option<&Path> {
         Some(&*self.run_dir).filter(|run_dir| !run_dir.as_os_str().is_empty())
+    }
+
+    /// File for the remark of the component on the run; `None` in memory.
+    pub(crate) fn remark_path(&self) -> Option<PathBuf> {
+        self.run_dir().map(|run_dir| remark::path(run_dir, self.index, self.generation))
     }
 
     /// The node's name in the run.

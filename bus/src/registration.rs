@@ -226,6 +226,8 @@ pub(crate) trait Instance: Send {
         inputs: InputSamples<'_>,
         outputs: &mut OutputSamples<'_>,
     ) -> Result<(), StepError>;
+    /// As [`Component::remark`].
+    fn remark(&self) -> Option<String>;
     fn finish(&mut self) -> Result<(), StepError>;
 }
 
@@ -271,6 +273,10 @@ impl<C: Component> Instance for Made<C> {
             Ok(ref sent) => Ok(sent.write(outputs)?),
             Err(error) => Err(error),
         }
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.component.remark(&self.state)
     }
 
     fn finish(&mut self) -> Result<(), StepError> {

@@ -13,9 +13,11 @@ use crate::node::Node;
 use crate::port::{InPort, Locals, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
 use crate::registration::{Instance, Registration};
+use crate::remark::Remark;
 use crate::tick::Tick;
 use inputs::InputFiles;
 use std::any::Any;
+use std::path::PathBuf;
 
 /// Runs the component `C` as the node that the launcher started this process for: the whole `main` of an executable
 /// that a manifest names as a `command`.
@@ -48,6 +50,8 @@ pub(crate) struct Part {
     wiring: Wiring,
     instance: Box<dyn Instance>,
     transfer: Transfer,
+    /// File for the remark of the component; `None` in memory.
+    remark_path: Option<PathBuf>,
 }
 
 impl Part {
@@ -77,7 +81,8 @@ impl Part {
         let made = registration.make_for(plan, node_plan, files, node.run_dir());
         let instance = made.map_err(|reason| node.error(reason))?;
         let (name, transfer) = (node.name().to_owned(), registration.transfer);
-        Ok(Self { name, node: Some(node), wiring, instance, transfer })
+        let remark_path = node.remark_path();
+        Ok(Self { name, node: Some(node), wiring, instance, transfer, remark_path })
     }
 
     /// Name of the node.
@@ -115,6 +120,17 @@ impl Part {
         told.map_err(|error| BusError::Parameters { node: self.name.clone(), reason: error.to_string() })
     }
 
+    /// Remark of the component on the run.
+    pub(crate) fn remark(&self) -> Option<Remark> {
+        Some(Remark { text: self.instance.remark()?, node: self.name.clone() })
+    }
+
+    /// Leaves the remark of the component where the launcher finds it.
+    fn leave_remark(&self) -> Result<(), BusError> {
+        let Some(path) = &self.remark_path else { return Ok(()) };
+        self.remark().map_or(Ok(()), |remark| remark.store(path))
+    }
+
     /// The component with its state, as the computation that steps at each tick.
     pub(crate) fn computation(&mut self) -> Wired<'_> {
         Wired { instance: &mut *self.instance, wiring: &self.wiring, given: None }
@@ -128,11 +144,12 @@ pub(crate) fn finish(
 ) -> Result<(), BusError> {
     let mut finished = Ok(());
     for mut part in parts {
+        let left = part.leave_remark();
         let Part { name: node, instance, .. } = &mut part;
         let ended = instance.finish();
         let ended =
             ended.map_err(|error| BusError::Program { node: node.clone(), reason: error.to_string() });
-        finished = finished.and(ended);
+        finished = finished.and(ended).and(left);
     }
     match end {
         Ok(()) | Err(BusError::Aborted) => finished.and(end),

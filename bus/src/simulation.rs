@@ -12,6 +12,7 @@ use crate::node::{DeclaredOutput, Node};
 use crate::plan::Plan;
 use crate::port::{Feed, InPort, OutPort};
 use crate::registration::Registration;
+use crate::remark::Remark;
 use crate::run_process::{Part, finish};
 use crate::schema::Schema;
 use crate::stepper::{Stepped, Stepper};
@@ -310,6 +311,12 @@ impl Simulation {
     pub fn overruns(&self) -> Vec<(String, u32, u32)> {
         let timed = self.members.iter().filter(|member| !member.words.is_empty());
         timed.map(|member| (member.part.name().to_owned(), member.overruns[0], member.overruns[1])).collect()
+    }
+
+    /// Remarks of the components on the run, as [`Component::remark`](crate::Component::remark) returns them.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<Remark> {
+        self.members.iter().filter_map(|member| member.part.remark()).collect()
     }
 
     /// Finishes the components, whose ticks ended with `end`: a recorder closes its file.

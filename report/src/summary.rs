@@ -5,6 +5,7 @@ use crate::ground::{self, BelowGround};
 use crate::judge::{self, Figures, Found, Verdict, WindowErrors};
 use crate::shadow::{self, Difference, Replacement};
 use bus::plan::Plan;
+use bus::remark::Remark;
 use diagnostics::{Diagnostic, Error, printable_line};
 use recorder::reader::Recording;
 use runtime::checkpoint::Written;
@@ -49,6 +50,8 @@ pub struct Summary {
     pub processes: Vec<ProcessSummary>,
     /// Processes whose steps take simulated time.
     pub computing_times: Vec<OverrunSummary>,
+    /// Remarks of the components on the run: facts that the user must know although it went on.
+    pub remarks: Vec<Remark>,
     /// The recording.
     pub recording: Option<PathBuf>,
     /// Checkpoints that were written and kept.
@@ -137,6 +140,7 @@ impl Summary {
     ///     missed_deadlines: 0,
     ///     processes: vec![("plant".to_owned(), 0.25, 0)],
     ///     overruns: Vec::new(),
+    ///     remarks: Vec::new(),
     ///     replacements: Vec::new(),
     ///     flight: None,
     ///     figures: None,
@@ -169,6 +173,7 @@ impl Summary {
             missed_deadlines: outcome.missed_deadlines,
             processes: outcome.processes.into_iter().map(process).collect(),
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
+            remarks: outcome.remarks,
             recording: None,
             checkpoints: outcome.checkpoints,
             missed_checkpoints: outcome.missed_checkpoints,
@@ -336,6 +341,7 @@ impl fmt::Display for Summary {
         self.pass.iter().chain(&self.measures).try_for_each(|verdict| writeln!(f, "{verdict}"))?;
         self.beyond.iter().flatten().try_for_each(|beyond| writeln!(f, "{beyond}"))?;
         self.below_ground.iter().flatten().try_for_each(|below| writeln!(f, "{below}"))?;
+        self.remarks.iter().try_for_each(|remark| writeln!(f, "  warning: {remark}"))?;
         self.unevaluated.iter().try_for_each(|name| {
             let name = printable_line(name);
             writeln!(f, "  the flight envelope of {name} was not evaluated: it needs a recording")

@@ -142,12 +142,16 @@ pub(crate) fn fly(
         (_, error) => error,
     })?;
     let (ticks, overruns) = (simulation.tick(), simulation.overruns());
-    match catch_unwind(AssertUnwindSafe(|| simulation.finish(end))) {
+    let finish = || {
+        let remarks = simulation.remarks();
+        simulation.finish(end).map(|()| remarks)
+    };
+    let remarks = match catch_unwind(AssertUnwindSafe(finish)) {
         Ok(finished) => finished.map_err(failed)?,
         Err(panic) => {
             return Err(ComponentFailure::new(None, panicked(Active::Component, &*panic)).into());
         }
-    }
+    };
     Ok(Outcome {
         first_tick: graph.plan.first_tick,
         ticks,
@@ -156,6 +160,7 @@ pub(crate) fn fly(
         missed_deadlines: run.missed_deadlines,
         processes: Vec::new(),
         overruns,
+        remarks,
         replacements: Vec::new(),
         flight: None,
         figures: None,

@@ -27,6 +27,7 @@ use crate::world::Spent;
 use anyhow::Context;
 use bus::lockstep::SupervisorView;
 use bus::plan::{Pace, Plan};
+use bus::remark::Remark;
 use bus::watch::WatchFiles;
 use diagnostics::Error;
 use inputs::InputFiles;
@@ -505,6 +506,7 @@ impl<'a> Launcher<'a> {
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
         outcome.replacements = supervisor.decisions.replacements.into_reports();
+        outcome.remarks = Remark::all_of(dir)?;
         if plan.profile {
             outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.replacements)?);
         }
@@ -597,6 +599,7 @@ fn outcome(plan: &Plan, control: &SupervisorView, supervisor: &Supervisor<'_, Ho
         missed_deadlines: control.missed_deadlines(),
         processes: std::iter::once(clock).chain(nodes).collect(),
         overruns: overruns.collect(),
+        remarks: Vec::new(),
         replacements: Vec::new(),
         flight: None,
         figures: None,

@@ -4,6 +4,7 @@ use crate::checkpoint::Written;
 use crate::flight::Flight;
 use crate::rewind::Rewound;
 use crate::supervisor::replacement::Report;
+use bus::remark::Remark;
 
 /// The outcome of a run, as [`Launcher::fly`](crate::launcher::Launcher::fly) returns it.
 #[derive(Debug)]
@@ -23,6 +24,8 @@ pub struct Outcome {
     /// Name, overruns and skipped steps of each process whose steps take simulated time. An overrun is a step that
     /// took longer than to the next due tick; a skipped step is a due tick without a step.
     pub overruns: Vec<(String, u32, u32)>,
+    /// Remarks of the components on the run, in the order of the nodes.
+    pub remarks: Vec<Remark>,
     /// Results of backups.
     pub replacements: Vec<Report>,
     /// The host times that the processes noted, in a run that is profiled.

@@ -205,6 +205,7 @@ pub fn run(
         print_text(&text)?;
     } else {
         summary.missed_checkpoints.iter().for_each(|missed| say(&format!("warning: {missed}")));
+        summary.remarks.iter().for_each(|remark| say(&format!("warning: {remark}")));
     }
     if !summary.checkpoints.is_empty()
         && let Some(warning) = earlier.as_ref().and_then(Earlier::warning)
