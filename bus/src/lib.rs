@@ -16,7 +16,7 @@
 //! | transport of samples | `transport` (iceoryx2), `local` (within a process), `sample_ring` (to the recorder), [`watch`] (to watchers) |
 //! | states: hand-over, checkpoints | `state_transfer`, `hand_over`, [`checkpoint`], `saved_sample` |
 //! | host times | `profile`, `step_times`, `host_time` |
-| remarks of components on a run | [`remark`] |
+//! | remarks of components on a run | [`remark`] |
 //! | files and memory of a run | `announcement`, `description`, `shared_file`, `json_file`, `user_file`, `reserve`, `room`, `claim`, `process` |
 //! | nodes of other languages, tests, people | [`dynamic`], `harness`, `node_harness`, `input_messages`, [`asked`] |
 

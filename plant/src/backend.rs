@@ -49,6 +49,11 @@ pub trait Backend: Send {
         None
     }
 
+    /// A remark on the accuracy of the motion since the backend was made, if the user must know one. It is not part of the state.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+
     /// The battery, if an effect models it.
     fn battery(&self) -> Option<Battery>;
 

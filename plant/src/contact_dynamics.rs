@@ -25,6 +25,7 @@
 //! | `touching`, `ties`, `scratch` | the buffers of a step: contacts, joints, and all of them |
 //! | `warm_start`, `record` | the impulses of the last step, and all that lasts from step to step |
 //! | `unsolved` | impulses that were not found |
+//! | `doubts` | results that were taken although they are off, counted |
 //! | `contacts` | when contacts begin and end |
 //! | `corners` | corners of large faces that parry leaves out |
 //! | `sheet` | triangles that touch with their borders |
@@ -38,6 +39,7 @@ mod constraints;
 mod contacts;
 mod corners;
 mod direct;
+mod doubts;
 mod drive;
 mod energy;
 mod free_bodies;
@@ -75,6 +77,7 @@ use crate::saved::{Fingerprint, Saved, saved_fields};
 use crate::snapshot::SnapshotError;
 use crate::state::{RigidBody, State};
 use contacts::Contacts;
+use doubts::Doubts;
 pub(crate) use free_bodies::Misfit;
 use free_bodies::{FIRST_THING, FreeBodies};
 use hull::Hull;
@@ -169,6 +172,8 @@ impl Rapier {
             contacts: Contacts::new(1 + scene.thing_count() + TRAFFIC_MAX, crash_speed_m_s),
             held: Held::new(bodies, scene.joints.len()),
             unsolved: None,
+            doubts: Doubts::default(),
+            is_vehicle_near_bodies: false,
         };
         let motion = Motion { system, world, record, scratch: Scratch::new(bodies) };
         let others = Vec::with_capacity(TRAFFIC_MAX);
@@ -347,6 +352,10 @@ impl Backend for Rapier {
             _ => named(number).map_or("another vehicle".to_owned(), |name| format!("\"{name}\"")),
         };
         self.motion.record.unsolved.map(|unsolved| unsolved.message(name))
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.motion.record.doubts.remark()
     }
 
     fn battery(&self) -> Option<Battery> {

@@ -113,6 +113,10 @@ impl Component for Plant {
         set_body(memory, measured);
         Ok(outputs)
     }
+
+    fn remark(&self, memory: &PlantMemory) -> Option<String> {
+        memory.backend.remark()
+    }
 }
 
 impl Plant {

@@ -62,6 +62,16 @@ pub(super) struct FreeBodies {
     pub objects: Vec<u32>,
 }
 
+/// Energy of the free bodies, where nothing that moves does work on them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Energy {
+    pub kinetic_J: f64,
+    /// Potential energy, 0 at the height of the world's origin.
+    pub potential_J: f64,
+    /// Weight of all bodies, times their number: as if all were one pile.
+    pub piled_N: f64,
+}
+
 /// Buffers for a step of the bodies: kept, so that a step takes no memory.
 #[derive(Default)]
 pub(super) struct Work {
@@ -216,6 +226,24 @@ impl FreeBodies {
             build.energy_J(state, [&one[number].twist, &other[number].twist])
         });
         energies.sum()
+    }
+
+    /// The energy of the bodies where they are; `None` if there are none, or joints do work on them: those that tie the vehicle,
+    /// and driven ones.
+    pub(super) fn energy(&self, gravity_m_s2: f64) -> Option<Energy> {
+        let is_driven = self.joints.iter().any(|joint| joint.drive.is_some());
+        if self.builds.is_empty() || self.is_vehicle_tied || is_driven {
+            return None;
+        }
+        let mut energy = Energy { kinetic_J: 0.0, potential_J: 0.0, piled_N: 0.0 };
+        for (build, state) in self.builds.iter().zip(&self.states) {
+            let (w, weight_N) = (&state.angular_velocity_B_rad_s, build.mass_kg * gravity_m_s2);
+            energy.kinetic_J += 0.5 * build.mass_kg * state.velocity_W_m_s.norm_squared();
+            energy.kinetic_J += 0.5 * w.dot(&(build.inertia * w));
+            energy.potential_J += weight_N * state.position_W_m.z;
+            energy.piled_N += weight_N * self.builds.len() as f64;
+        }
+        Some(energy)
     }
 
     /// A step of `span_s` of the vehicle at `vehicle` and all bodies, without contacts; those end in `work.free`.

@@ -3,6 +3,7 @@
 //! It lasts from step to step; the buffers of `scratch` do not.
 
 use super::contacts::{Contacts, Sighting};
+use super::doubts::Doubts;
 use super::energy;
 use super::free_bodies::{FIRST_BODY, VEHICLE};
 use super::multibody::Multibody;
@@ -18,6 +19,10 @@ pub(super) struct Record {
     pub held: Held,
     /// The first impulses that were not found.
     pub unsolved: Option<Unsolved>,
+    /// Results that were taken although they are off.
+    pub doubts: Doubts,
+    /// True if the vehicle came near to a free body in this step, on which it may do work.
+    pub is_vehicle_near_bodies: bool,
 }
 
 impl Record {
@@ -45,6 +50,8 @@ impl Record {
 
     /// Notes impulses that do not satisfy the laws, or that made energy: before them it was `start_J`.
     pub(super) fn judge(&mut self, system: &Multibody, scratch: &Scratch, found: Found, start_J: f64) {
+        self.is_vehicle_near_bodies |= scratch.touching.is_vehicle_near_bodies();
+        self.doubts.note_impulses(&found);
         let outcome = Outcome { found, start_J, gain_J: energy::gain_J(system, scratch, start_J) };
         let objects = &system.free_bodies.objects;
         let unsolved = || Unsolved::of(&outcome, &scratch.touching, &scratch.twists.then, objects);

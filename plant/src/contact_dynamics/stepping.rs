@@ -7,6 +7,7 @@
 
 use super::body::twist;
 use super::constraints;
+use super::free_bodies::Energy;
 use super::free_step::Free;
 use super::impact;
 use super::lasting;
@@ -56,6 +57,8 @@ impl Motion {
         [time_s, span_s]: [f64; 2],
         others: &mut [Neighbour],
     ) {
+        let start = if others.is_empty() { self.energy() } else { None };
+        self.record.is_vehicle_near_bodies = false;
         let slow_m_s = SLOW_STEPS * self.system.model.vehicle().gravity_m_s2 * span_s;
         let mut rest = Rest { time_s, left_s: span_s, slow_m_s, cuts: 0, is_pushed: false };
         let mut free = self.free(actuation, [time_s, span_s]);
@@ -66,6 +69,21 @@ impl Motion {
         if !rest.is_pushed && !self.system.is_held() {
             // Cut for a gap that did not close after all: the flight is free, and its steps are those of free flight.
             self.system.state = uncut;
+        }
+        if let Some(start) = start {
+            self.check_energy(&start);
+        }
+    }
+
+    /// Energy of the free bodies, if only the vehicle can do work on them.
+    fn energy(&self) -> Option<Energy> {
+        self.system.free_bodies.energy(self.system.model.vehicle().gravity_m_s2)
+    }
+
+    /// Checks the energy of the free bodies after a step from `start`, unless the vehicle may have done work on them.
+    fn check_energy(&mut self, start: &Energy) {
+        if let Some(end) = self.energy().filter(|_| !self.record.is_vehicle_near_bodies) {
+            self.record.doubts.note_step(start, &end);
         }
     }
 

@@ -3,6 +3,7 @@
 //! The search for the impulses of these constraints is in `scratch`.
 
 use super::corners;
+use super::free_bodies::{FIRST_BODY, VEHICLE};
 use super::solver::{Body, Unilateral};
 use super::world::Near;
 use nalgebra::Vector3;
@@ -46,6 +47,12 @@ impl Touching {
     /// True if another vehicle is near.
     pub(super) fn is_among_others(&self) -> bool {
         self.near.iter().any(|near| near.neighbour.is_some())
+    }
+
+    /// True if a constraint is between the vehicle and a free body, or another vehicle.
+    pub(super) fn is_vehicle_near_bodies(&self) -> bool {
+        let mut pairs = self.constraints.iter().map(|it| it.normal.bodies);
+        pairs.any(|pair| pair.contains(&VEHICLE) && pair.iter().any(|body| *body >= FIRST_BODY))
     }
 
     /// True if a constraint pushes any body.
