@@ -4,6 +4,7 @@ use crate::recordings;
 use crate::refusals::{good, refused, refused_text};
 use crate::skipped::is_left;
 use crate::support::{Place, repository};
+use bus::messages::{Contact, PlantState, Traffic};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The good manifest's plant on the backend `rapier`, with `more` of its keys.
@@ -113,6 +114,106 @@ outputs.contact = {{}}
     );
     let path = place.write("meet.toml", text);
     place.call(&["run", &path]).with_code(0);
+}
+
+/// Numbers of the two of [`twenty`] that fly towards each other.
+const PAIR: [usize; 2] = [18, 19];
+
+/// Start of vehicle `number`, and its speed along x: the pair 1 m from each other at 1 m/s, the others 2 m apart on a grid.
+fn start_of(number: usize) -> ([f64; 3], f64) {
+    match number {
+        18 => ([2.5, 3.0, 1.0], 1.0),
+        19 => ([3.5, 3.0, 1.0], -1.0),
+        _ => ([2.0 * (number % 5) as f64 - 4.0, 2.0 * (number / 5) as f64 - 3.0, 1.0], 0.0),
+    }
+}
+
+/// Twenty vehicles of the hover's set in the room of the thesis, each with its own estimator and controller, and in the world of each the
+/// others.
+fn twenty() -> String {
+    let vehicle = |number: usize| {
+        let (position, speed_m_s) = start_of(number);
+        format!(
+            r#"
+[[vehicle]]
+name = "v{number:02}"
+set = "hummingbird"
+process.plant.parameters.initial_position_m = {position:?}
+process.plant.parameters.initial_velocity_m_s = [{speed_m_s:?}, 0.0, 0.0]
+process.ekf.parameters.initial_position_m = {position:?}
+"#
+        )
+    };
+    let inputs: Vec<String> =
+        (0..20).map(|number| format!("v{number:02} = \"/v{number:02}/plant/state\"")).collect();
+    format!(
+        r#"include = ["{set}"]
+
+[run]
+duration_s = 0.8
+
+[process.traffic]
+kind = "traffic"
+inputs = {{ {inputs} }}
+
+[set.hummingbird.process.plant]
+scene = "{room}"
+parameters.backend = "rapier"
+inputs.traffic = {{ topic = "/traffic/traffic", delay_ticks = 1, initial = {{ count = 0 }} }}
+outputs.contact = {{}}
+{vehicles}"#,
+        set = repository("manifests/sets/hover-set.toml"),
+        inputs = inputs.join(", "),
+        room = repository("scenes/room.toml"),
+        vehicles = (0..20).map(vehicle).collect::<String>(),
+    )
+}
+
+#[test]
+fn of_twenty_vehicles_that_share_a_room_two_meet_as_far_as_the_shape_reaches() {
+    // Twice the radius of the disc around all propellers: an arm of 0.17 m and a propeller of 0.1016 m.
+    const MEET_M: f64 = 2.0 * 0.2716;
+    // Both move on by a part of a tick, at up to 3 m/s from each other.
+    const WITHIN_M: f64 = 5e-3;
+    let place = Place::new();
+    let manifest = hummingbus::load(place.write("twenty.toml", twenty())).unwrap();
+    let mut simulation = hummingbus::simulate(&manifest).unwrap();
+    let topic = |number: usize, port: &str| format!("/v{number:02}/plant/{port}");
+    let states: Vec<_> =
+        (0..20).map(|number| simulation.topic::<PlantState>(&topic(number, "state")).unwrap()).collect();
+    let contacts: Vec<_> =
+        (0..20).map(|number| simulation.topic::<Contact>(&topic(number, "contact")).unwrap()).collect();
+    let traffic = simulation.topic::<Traffic>("/traffic/traffic").unwrap();
+    let (mut met, mut nearest_m) = (Vec::new(), f64::INFINITY);
+    for tick in 0..800 {
+        simulation.step().unwrap();
+        let [one, other] = PAIR.map(|number| simulation.newest(states[number]).unwrap().position);
+        let apart_m = libm::hypot(libm::hypot(other.x - one.x, other.y - one.y), other.z - one.z);
+        nearest_m = nearest_m.min(apart_m);
+        let [one, other] = PAIR.map(|number| *simulation.newest(contacts[number]).unwrap());
+        if met.is_empty() && (one.began, other.began) != (0, 0) {
+            met.push((tick, apart_m));
+            assert_eq!((one.object, other.object), (1019, 1018), "each meets the other");
+        }
+    }
+    // 0.4568 m at 2 m/s.
+    let [(tick, apart_m)] = met[..] else { panic!("they do not meet: {nearest_m} m") };
+    assert!((215..245).contains(&tick), "they meet at tick {tick}");
+    assert!(
+        (apart_m - MEET_M).abs() < WITHIN_M && nearest_m > MEET_M - WITHIN_M,
+        "{apart_m} m, {nearest_m} m"
+    );
+    let seen = simulation.newest(traffic).unwrap();
+    assert_eq!(seen.count, 20);
+    for number in (0..20).filter(|number| !PAIR.contains(number)) {
+        let (state, (start_m, _)) = (simulation.newest(states[number]).unwrap(), start_of(number));
+        let off_m =
+            [state.position.x - start_m[0], state.position.y - start_m[1], state.position.z - start_m[2]];
+        assert!(off_m.iter().all(|off_m| off_m.abs() < 0.2), "v{number:02} is off its place by {off_m:?} m");
+        assert!(state.rotor_speed[0] > 100.0, "v{number:02} flies");
+        assert_eq!(simulation.newest(contacts[number]).unwrap().began, 0, "v{number:02} touches nothing");
+        assert_eq!(<[f64; 3]>::from(seen.position[number]), <[f64; 3]>::from(state.position));
+    }
 }
 
 #[test]
