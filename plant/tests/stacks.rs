@@ -274,6 +274,23 @@ fn impulses_that_are_not_found_are_told_with_the_names_of_both() {
     );
 }
 
+#[test]
+fn energy_that_steps_add_to_free_bodies_is_told() {
+    // 5 mm inside the ground, which lifts it out by half a millimetre a step, and takes no speed along.
+    let mut inside = Stack::new(&[cube("box", 10.0, [0.0, 0.0, 0.095])], 0.5, 2);
+    let start_J = inside.energy_J();
+    (0..100).for_each(|_| inside.tick());
+    let lifted_J = inside.energy_J() - start_J;
+    assert!((lifted_J - 10.0 * G_M_S2 * 5e-3).abs() < 1e-3, "{lifted_J} J");
+    let remark = inside.plant.remark().expect("ten steps add energy");
+    for part in ["free bodies gained energy in 10 of 200 steps", "4.9e-1 J in all", "4.9e-2 J in one"] {
+        assert!(remark.contains(part), "{remark}");
+    }
+    let mut fallen = Stack::new(&falling(1.0, [0.0, 0.0], 0.05), 0.5, 2);
+    (0..500).for_each(|_| fallen.tick());
+    assert_eq!(fallen.plant.remark(), None, "a fall, an impact and a rest");
+}
+
 mod drawn {
     use super::*;
     use crate::skipped::drawn;
