@@ -2,22 +2,10 @@
 //!
 //! The first line of a comment and the first line of each of its paragraphs count. Their other lines are free.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::sources::{Source, doc_line, rust_files};
 
 /// Words that no paragraph of a doc comment begins with.
 const QUESTIONS: [&str; 8] = ["What", "Whatever", "Who", "Whether", "How", "Which", "Where", "Why"];
-
-/// Folders that hold files of other projects or of builds.
-const FOREIGN: [&str; 3] = ["target", "vendor", "node_modules"];
-
-/// Returns the marker and the content of a line of a doc comment.
-fn doc_line(line: &str) -> Option<(&str, &str)> {
-    let (marker, content) = line.trim_start().split_at_checked(3)?;
-    // A fourth slash makes an ordinary comment.
-    let is_doc = matches!(marker, "///" | "//!") && !content.starts_with('/');
-    is_doc.then_some((marker, content.trim()))
-}
 
 /// True if a text begins with one of [`QUESTIONS`].
 fn is_question(content: &str) -> bool {
@@ -52,35 +40,12 @@ fn questions(text: &str) -> Vec<usize> {
     found
 }
 
-/// Adds the Rust files in `folder` and below to `files`, in the order of their names.
-fn add_files(folder: &Path, files: &mut Vec<PathBuf>) {
-    let mut entries: Vec<_> = fs::read_dir(folder).unwrap().map(Result::unwrap).collect();
-    entries.sort_by_key(fs::DirEntry::file_name);
-    for entry in entries {
-        let (path, name) = (entry.path(), entry.file_name());
-        let name = name.to_string_lossy();
-        if entry.file_type().unwrap().is_dir() {
-            if !name.starts_with('.') && !FOREIGN.contains(&&*name) {
-                add_files(&path, files);
-            }
-        } else if name.ends_with(".rs") {
-            files.push(path);
-        }
-    }
-}
-
 #[test]
 fn doc_comments_begin_with_a_noun_or_a_verb() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files = Vec::new();
-    add_files(root, &mut files);
-    assert!(files.len() > 500, "found only {} files", files.len());
     let mut found = String::new();
-    for file in files {
-        let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
-        let short = file.strip_prefix(root).unwrap().display();
+    for Source { path, text } in rust_files() {
         for number in questions(&text) {
-            found += &format!("{short}:{number}: {}\n", text.lines().nth(number - 1).unwrap().trim());
+            found += &format!("{path}:{number}: {}\n", text.lines().nth(number - 1).unwrap().trim());
         }
     }
     assert!(
