@@ -322,8 +322,8 @@ mod tests {
         assert_eq!(
             missing,
             [
-                "rotor-drag: the air that crosses a spinning rotor drags at its hub, linear in both speeds; coefficient 1.414·10⁻⁶ \
-              N·s²/(m·rad) (1.362·10⁻⁶ to 1.465·10⁻⁶)."
+                "rotor-drag: drag at the hub of a spinning rotor, linear in the rotor speed and in the speed across the \
+                 rotor; coefficient 1.414·10⁻⁶ N·s²/(m·rad) (1.362·10⁻⁶ to 1.465·10⁻⁶)."
             ]
         );
         assert_eq!(

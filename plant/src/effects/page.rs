@@ -7,9 +7,9 @@ use std::fmt::Write;
 const HEAD: &str = "# Effects
 <!-- Written by `hummingbus effects --markdown >docs/effects.md` from plant/src/effects. -->
 
-An effect is a named piece of physics beyond the declared vehicle. A vehicle file lists those of the vehicle, a scene
-file those of the surroundings; the plant flies both, the vehicle's first, each in the order of its file, and each
-effect once. Forces, torques and changes of thrust add up. `hummingbus effects NAME` prints the section of one effect.
+An effect adds one piece of physics to the declared vehicle, such as drag, wind or a late command. List the effects of the
+vehicle in its vehicle file, and those of the surroundings in the scene file. `hummingbus effects NAME` prints the section of
+one effect.
 
 ```toml
 [[effects]]
@@ -17,24 +17,29 @@ name = \"rotor-drag\"
 coefficient = { value = 8.06428e-5, unit = \"N*s^2/(m*rad)\", source = \"RotorS\", uncertainty = \"not stated\" }
 ```
 
-A parameter that is left out has its neutral value, with which it does nothing; one without a neutral value has to be
-given. Controllers read the same vehicle file and know nothing of its effects. A vehicle file that only adds effects to
-another names it with `base = \"hummingbird.toml\"`, a path relative to itself, and holds `name`, `notes`
-and `[[effects]]`. It may replace numbers of its base as well ([manifest.md](plant.md#plant)).
+A parameter that is absent has its neutral value, with which it does nothing. A parameter without a neutral value is
+required. Controllers read the same vehicle file and ignore its effects. A vehicle file may add effects to another file: it
+then has `base = \"hummingbird.toml\"`, a path relative to itself, `name`, `notes` and `[[effects]]`. It may also replace
+numbers of its base ([plant.md](plant.md#plant)).
 
-Drag, inflow and whatever else depends on the motion are evaluated at every stage of the integration; how the air moves,
-delays and the battery are settled when a tick begins and hold over it. Random effects draw from a stream of their own,
-made from the run's seed, the plant's name and the effect's name: adding one changes no other's noise.
+**Order.** The plant applies the effects of the vehicle first, then those of the scene, each in the order of its file, and
+each effect once. Forces, torques and changes of thrust add up.
 
-Thrusts T_i, speeds w_i, axes a_i, hub velocities v_i and heights z_i are those of rotor i; `up` is the vertical, in the
-body. T_i is c_T w_i |w_i|: effects do not act on each other's changes of thrust.
+**Time.** Drag, inflow and all else that depends on the motion is evaluated at every stage of the integration. The motion of
+the air, delays and the battery are computed at the begin of a tick, and stay constant over it.
 
-Delay and bias of a sensor are no effects: they are parameters of the sensors ([manifest.md](manifest.md)).
+**Random numbers.** Each random effect has a stream of its own, from the run's seed, the plant's name and the effect's name.
+A new effect does not change the noise of another.
 
-An effect is one file in `plant/src/effects/catalogue` and its row in `catalogue.rs`. Manifests, this page, the tests of
-all effects and `hummingbus identify` know no more of it than stands there.
+**Symbols.** Thrusts T_i, speeds w_i, axes a_i, hub velocities v_i and heights z_i are those of rotor i. `up` is the vertical,
+in the body. T_i is c_T w_i |w_i|: effects do not act on each other's changes of thrust.
 
-| effect | what it does |
+Delay and bias of a sensor are parameters of the sensors and not effects ([sensors.md](sensors.md)).
+
+Each effect is one file in `plant/src/effects/catalogue` and a row in `catalogue.rs`. Manifests, this page, the tests of all
+effects and `hummingbus identify` use nothing else.
+
+| effect | physics |
 |---|---|
 ";
 
@@ -65,7 +70,7 @@ pub fn of(kind: &EffectKind) -> String {
     let _ = writeln!(page, "- **Fitted:** {}.", fitted(kind));
     for other in CATALOGUE {
         if let Some(experiment) = kind.experiment_against(other) {
-            let _ = writeln!(page, "- **Told from [`{0}`](#{0}):** {experiment}.", other.name);
+            let _ = writeln!(page, "- **To tell from [`{0}`](#{0}):** {experiment}.", other.name);
         }
     }
     page.push('\n');
@@ -89,7 +94,7 @@ pub fn plain(kind: &EffectKind) -> String {
     ];
     for other in CATALOGUE {
         if let Some(experiment) = kind.experiment_against(other) {
-            facts.push((format!("told from {}", other.name), experiment.to_owned()));
+            facts.push((format!("to tell from {}", other.name), experiment.to_owned()));
         }
     }
     let width = facts.iter().map(|(title, _)| title.len()).max().unwrap_or_default();
@@ -119,8 +124,7 @@ pub fn plain(kind: &EffectKind) -> String {
 /// Describes how an identification fits it.
 fn fitted(kind: &EffectKind) -> String {
     if kind.randomness == Randomness::Stochastic {
-        return "not at all: no fit can follow random numbers, what it leaves counts as unexplained"
-            .to_owned();
+        return "not at all: no fit can follow random numbers. What remains counts as unexplained".to_owned();
     }
     let part = match kind.fit_as {
         FitAs::Whole => "as a whole",

@@ -10,13 +10,15 @@ use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "battery-sag",
-    summary: "the battery's voltage falls as it empties and under load, and the speed that a command asks for with it",
+    summary: "the battery's voltage falls with its charge and under load, and the commanded rotor speed \
+              falls with it",
     equation: "w_target U / U_0 with U = U_0 - D (1 - q) - R I, U I = sum c_Q |w_i|^3 / eta, \
                q = 1 - q_0 - (charge drawn) / C",
     source: "equivalent circuit of a voltage and a resistance: Plett, Battery Management Systems I, 2015, chapter 2; a brushed or \
              open-loop motor's speed follows its voltage. The charge's line from full to empty is own",
-    validity: "between a full and an empty battery, where the discharge curve is near a line; no recovery after load; \
-               a controller of rotor speed, which holds the speed until its headroom is gone, needs no sag",
+    validity: "the range between a full and an empty battery in which the discharge curve is near a line. \
+               No recovery after load. A controller of rotor speed holds the speed until its headroom is \
+               gone, and needs no sag",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(sag), Action::Battery(battery)],
     needs: &[Quantity::Command],

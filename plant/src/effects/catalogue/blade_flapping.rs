@@ -8,7 +8,8 @@ use diagnostics::unit::{ROTARY_STIFFNESS, TILT};
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "blade-flapping",
-    summary: "the advancing blade rises: the thrust tilts away from where the rotor is flown, and twists the hub",
+    summary: "the advancing blade rises: the thrust tilts against the direction of flight, with a torque on \
+              the hub",
     equation: "t_i = k (v_i - (v_i . a_i) a_i), F_i = -T_i t_i at the hub, tau_i = K_b t_i x a_i",
     source: "Hoffmann, Huang, Waslander and Tomlin, Quadrotor helicopter flight dynamics and control, AIAA \
              2007-6461: blade flapping; Mahony, Kumar and Corke, IEEE RAM 19(3), 2012",

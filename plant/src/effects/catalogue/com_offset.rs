@@ -11,9 +11,9 @@ pub static EFFECT: EffectKind = EffectKind {
     summary: "the centre of mass is not where it is declared, so that equal thrusts turn the vehicle",
     equation: "r_i - d for the hub of each rotor, d = (x, y, z)",
     source: "rigid-body mechanics: torques are taken about the centre of mass, which gravity acts on",
-    validity: "offsets that are small against the arms: the inertia stays, of which m d^2 would have to be taken, and \
-               the pose of the vehicle is that of the centre of mass, so that sensors move with it. z acts only where \
-               something pushes in the plane of the rotors, such as rotor-drag",
+    validity: "offsets that are small against the arms. The inertia stays as declared: m d^2 is not \
+               subtracted. The pose of the vehicle is that of the centre of mass, so that sensors move with \
+               it. z acts only if a force in the plane of the rotors acts too, such as rotor-drag",
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(shift)],
     needs: &[Quantity::Torque],

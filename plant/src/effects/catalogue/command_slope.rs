@@ -7,7 +7,8 @@ use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "command-slope",
-    summary: "rotor speeds change more or less with the command than declared, about the speed of hover",
+    summary: "the slope from command to rotor speed, about the speed of hover, differs from the declared \
+              one",
     equation: "w_target = w + e (w - w_h), w by the declared command map, w_h of hover",
     source: "own (a deviation of the declared map; with thrust-scale, any line from command to speed)",
     validity: "the map stays a line; speeds that would turn below zero are zero",
@@ -34,7 +35,8 @@ effect_parameters! {
     }
 }
 
-const CLIMB: &str = "log rotor speeds; or climb and sink with strong changes of thrust, which the slope makes and an inertia does not";
+const CLIMB: &str = "log rotor speeds; or climb and sink with strong changes of thrust. The slope changes \
+                     them, an inertia does not";
 
 fn turn(values: &Values, vehicle: &mut Vehicle) {
     let Parameters { error } = values.into();

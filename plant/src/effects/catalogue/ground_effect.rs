@@ -8,13 +8,13 @@ use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "ground-effect",
-    summary: "a rotor near the ground has more thrust, as its downwash is held up",
+    summary: "a rotor near the ground has more thrust, since the ground slows its downwash",
     equation: "dT_i = T_i (1 / (1 - s (R / 4 z_i)^2) - 1), z_i the height of hub i, taken as R / 2 below that",
     source: "Cheeseman and Bennett, The effect of the ground on a helicopter rotor in forward flight, ARC R&M 3021, \
              1955, its hovering case; s as the coefficient of Sanchez-Cuevas, Heredia and Ollero, Int. J. of Aerospace \
              Engineering 2017, 1823056",
-    validity: "hover above z = R / 2; the loss of the effect in forward flight, the fountain between rotors and \
-               objects other than the ground are left out",
+    validity: "hover above z = R / 2. The loss of the effect in forward flight, the fountain between \
+               rotors, and objects other than the ground are left out",
     parameters: Parameters::SPECS,
     actions: &[Action::Thrust(gain_N)],
     needs: &[Quantity::Height, Quantity::Force],

@@ -5,11 +5,11 @@ use diagnostics::unit::{LENGTH, RATIO, TIME};
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "ground-turbulence",
-    summary: "downwash that the ground throws back shakes the thrust of each rotor at random, less with height",
+    summary: "downwash that the ground reflects varies the thrust of each rotor at random, less with height",
     equation: "dT_i = T_i exp(-max(z_i, 0) / h) n_i with n_i a Gauss-Markov process of deviation s and correlation \
                time t_c, independent between rotors, constant over a tick",
-    source: "own; stands for the random air particles near the ground of thesis section 5.1",
-    validity: "not a model of the flow: spectrum and height are tuned. It depends on the run's seed",
+    source: "own; represents the random air particles near the ground of thesis section 5.1",
+    validity: "tuned spectrum and height: this is not a model of the flow. It depends on the run's seed",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(shake)],
     randomness: Randomness::Stochastic,

@@ -11,14 +11,14 @@ pub static EFFECT: EffectKind = EffectKind {
     summary: "the moments of inertia are larger or smaller than declared",
     equation: "S J S with S = diag(sqrt(1 + e_xx), sqrt(1 + e_yy), sqrt(1 + e_zz)), so that J_xx (1 + e_xx)",
     source: "own (deviations of the declared tensor, which keep it positive definite)",
-    validity: "a tensor of which one moment is larger than the sum of the other two is no rigid body's, and refused",
+    validity: "rigid bodies: a tensor with one moment larger than the sum of the other two is refused",
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(stretch)],
     needs: &[Quantity::Torque],
     confounded_with: &[Confounder {
         effect: &thrust_scale::EFFECT,
-        experiment: "fly freely with a position or an accelerometer, which show thrust by itself; on a rig hang a known weight \
-                     at a known arm: its torque shows the inertia",
+        experiment: "fly freely with a position or an accelerometer, which show thrust by itself. On a rig, \
+                     hang a known weight at a known arm: its torque shows the inertia",
     }],
     require: Some(require_rigid),
     ..EffectKind::PLAIN

@@ -10,7 +10,7 @@ pub static EFFECT: EffectKind = EffectKind {
     summary: "the vehicle is heavier or lighter than declared",
     equation: "m (1 + e)",
     source: "own (a deviation of the declared mass)",
-    validity: "controllers go on believing the vehicle file; inertia stays (see `inertia-error`)",
+    validity: "controllers that use the declared mass; inertia stays (see `inertia-error`)",
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(weigh)],
     needs: &[Quantity::Force],

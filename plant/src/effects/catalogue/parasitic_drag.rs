@@ -11,7 +11,7 @@ use vehicles::Vehicle;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "parasitic-drag",
-    summary: "the air drags at fuselage and arms, quadratic in its speed",
+    summary: "drag of fuselage and arms, quadratic in the airspeed",
     equation: "F = -|v| (c_xy v_x, c_xy v_y, c_z v_z) at the centre of mass, v the velocity through the air",
     source: "Folk, Paulos and Kumar, RotorPy, arXiv 2306.04485: aerodynamic wrenches",
     validity: "a body alike in front and at its sides; no torque: pressure centre and centre of mass coincide",

@@ -14,9 +14,9 @@ pub static EFFECT: EffectKind = EffectKind {
     source: "Faessler, Franchi and Scaramuzza, Differential flatness of quadrotor dynamics subject to rotor drag for \
              accurate tracking of high-speed trajectories, IEEE RA-L 3(2), 2018, eq. 4: the term B w; the derivatives \
              L_p, M_q and N_r of Padfield, Helicopter Flight Dynamics, 2nd ed., 2007, chapter 4",
-    validity: "rotor speeds near those of hover; stands for rotors that lose thrust where a rotation raises them, and for \
-               stiff blades that the rotation makes flap. The drag of a fast turn, which grows with the square of the \
-               rate, is left out",
+    validity: "rotor speeds near those of hover. The torque represents the thrust that rotors lose while a \
+               rotation raises them, and the flapping of stiff blades. The drag of a fast turn grows with \
+               the square of the rate and is left out",
     parameters: Parameters::SPECS,
     actions: &[Action::Wrench(damp)],
     needs: &[Quantity::Torque, Quantity::RotorSpeed],

@@ -14,8 +14,8 @@ pub static EFFECT: EffectKind = EffectKind {
     equation: "tau = g S (z x up), J_xx + A and J_yy + A; S = sum m l, A = sum m l^2 over all masses at l below the \
                bearing",
     source: "the physical pendulum of any text on mechanics",
-    validity: "for flights on a rig, seen without it: the position is held by the bearing, whose force is not part of \
-               this. A scene with a rig has the pendulum by its joints already",
+    validity: "flights on a rig, simulated without it: the bearing holds the position, and its force is not \
+               part of the effect. A scene with a rig already has the pendulum by its joints",
     parameters: Parameters::SPECS,
     actions: &[Action::Vehicle(slow), Action::Wrench(swing)],
     needs: &[Quantity::Torque, Quantity::Attitude, Quantity::Rig],

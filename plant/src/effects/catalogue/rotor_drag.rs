@@ -7,7 +7,8 @@ use diagnostics::unit::ROTOR_DRAG;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "rotor-drag",
-    summary: "the air that crosses a spinning rotor drags at its hub, linear in both speeds",
+    summary: "drag at the hub of a spinning rotor, linear in the rotor speed and in the speed across the \
+              rotor",
     equation: "F_i = -c |w_i| (v_i - (v_i . a_i) a_i) at the hub of rotor i, v_i its velocity through the air",
     source: "Martin and Salaun, The true role of accelerometer feedback in quadrotor control, ICRA 2010; \
              Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 19(3), 2012",

@@ -6,13 +6,13 @@ use diagnostics::unit::{DYNAMIC_DRAG, ROTOR_DRAG};
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "translational-lift",
-    summary: "a rotor that climbs loses thrust, one that is flown sideways gains some",
+    summary: "a rotor loses thrust in a climb and gains thrust in sideways flight",
     equation: "dT_i = -k_z |w_i| (v_i . a_i) + k_h |v_i - (v_i . a_i) a_i|^2, v_i the hub's velocity through the air",
     source: "Svacha, Mohta and Kumar, Improving quadrotor trajectory tracking by compensating for aerodynamic \
              effects, ICUAS 2017: thrust model; blade element theory as in Leishman, Principles of Helicopter \
              Aerodynamics",
-    validity: "first terms of an expansion about hover: climb and descent well below the induced velocity (the \
-               Hummingbird: 5 m/s), no vortex ring; independent of the thrust itself",
+    validity: "first terms of an expansion about hover: climb and descent well below the induced velocity \
+               (the Hummingbird: 5 m/s), no vortex ring. Independent of the thrust itself",
     parameters: Parameters::SPECS,
     actions: &[Action::Thrust(lift_N)],
     needs: &[Quantity::Airspeed, Quantity::Force],

@@ -6,14 +6,15 @@ use diagnostics::unit::WIND_VELOCITY;
 /// Random gusts added to the wind.
 pub static EFFECT: EffectKind = EffectKind {
     name: "turbulence",
-    summary: "the air gusts at random, in strength and scale as Dryden's model has it near the ground",
+    summary: "random gusts, with the strength and scale of Dryden's model near the ground",
     equation: "each axis of v_air is a Gauss-Markov process of deviation s and correlation time L / V, constant over \
                a tick; s_z = 0.1 W, s_xy = s_z / (0.177 + 0.000823 h)^0.4, L_z = h, L_xy = h / (0.177 + 0.000823 \
                h)^1.2 with h in feet, held within 10...1000; V the speed through the air, at least W",
     source: "MIL-F-8785C, section 3.7, atmospheric disturbances: Dryden form, low-altitude model; the spectrum of \
              the longitudinal axis, of first order, is used for all three axes",
-    validity: "heights of 3 to 300 m over open ground; lower heights count as 3 m. Axes are the world's. It depends \
-               on the run's seed, starts from still air, and needs an effect that feels the air",
+    validity: "heights of 3 to 300 m over open ground; lower heights count as 3 m. Axes are the world's. It \
+               depends on the run's seed, starts from still air, and acts only through an effect that \
+               depends on the air",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(gust)],
     moves_air: true,

@@ -9,22 +9,22 @@ use nalgebra::Vector3;
 
 pub static EFFECT: EffectKind = EffectKind {
     name: "velocity-torque",
-    summary: "a torque by the speed through the air: flown forward, the nose rises",
+    summary: "a torque that grows with the airspeed: in forward flight the nose rises",
     equation: "tau = (k_x v_y, -k_y v_x, 0), v the velocity of the centre of mass through the air",
     source: "Faessler, Franchi and Scaramuzza, Differential flatness of quadrotor dynamics subject to rotor drag for \
              accurate tracking of high-speed trajectories, IEEE RA-L 3(2), 2018, eq. 4: the term A R^T v; the \
              derivatives L_v and M_u of Padfield, Helicopter Flight Dynamics, 2nd ed., 2007, chapter 4",
-    validity: "rotor speeds near those of hover and small advance ratios; stands for the drag of hubs above the centre \
-               of mass, for stiff blades that flap and for inflow that grows from front to rear. Negative for hubs far \
-               below the centre of mass",
+    validity: "rotor speeds near those of hover and small advance ratios. The torque represents the drag of \
+               hubs above the centre of mass, stiff blades that flap, and inflow that grows from front to \
+               rear. It is negative for hubs far below the centre of mass",
     parameters: Parameters::SPECS,
     actions: &[Action::Wrench(turn)],
     needs: &[Quantity::Airspeed, Quantity::Torque, Quantity::RotorSpeed],
     confounded_with: &[
         Confounder {
             effect: &blade_flapping::EFFECT,
-            experiment: "fly the same speeds with a heavier load: the force of flapping grows with thrust, and a torque \
-                         without that force is no flapping",
+            experiment: "fly the same speeds with a heavier load. The force of flapping grows with thrust, \
+                         and a torque without that force is no flapping",
         },
         Confounder {
             effect: &com_offset::EFFECT,

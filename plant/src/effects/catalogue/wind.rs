@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 /// The air moves steadily.
 pub static EFFECT: EffectKind = EffectKind {
     name: "wind",
-    summary: "the air moves steadily, everywhere alike",
+    summary: "a steady wind, the same everywhere",
     equation: "v_air += (x, y, z) in the world",
     source: "own (a definition)",
-    validity: "no shear near the ground or in the lee of walls; without an effect that feels the air, such as drag, \
-               it does nothing",
+    validity: "no shear near the ground or in the lee of walls. It acts only through an effect that depends \
+               on the air, such as drag",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(blow)],
     moves_air: true,
