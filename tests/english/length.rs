@@ -23,7 +23,8 @@ fn doc_comments(text: &str) -> String {
 /// Returns the sentences of a text that are too long.
 fn long_sentences(text: &str) -> Vec<Sentence> {
     let mut found = sentences(text);
-    found.retain(|sentence| sentence.words > WORDS_MAX);
+    // Words have two bytes with their blanks at least: most sentences are too short to be counted.
+    found.retain(|sentence| sentence.text.len() > 2 * WORDS_MAX && sentence.words() > WORDS_MAX);
     found
 }
 
@@ -38,8 +39,9 @@ fn require(what: &str, name: &str, sources: &[Source], ceiling: usize) {
         if !found.is_empty() {
             writeln!(counts, "{:4} {path}", found.len()).unwrap();
         }
-        for Sentence { line, words, text } in found {
-            writeln!(lines, "{path}:{line}: {words} words: {text}").unwrap();
+        for sentence in found {
+            let Sentence { line, text } = &sentence;
+            writeln!(lines, "{path}:{line}: {} words: {text}", sentence.words()).unwrap();
         }
     }
     assert!(
@@ -72,7 +74,7 @@ fn the_26th_word_makes_a_sentence_too_long() {
     let words = |count: usize| vec!["word"; count].join(" ");
     assert_eq!(long_sentences(&format!("{}. {}.", words(25), words(25))), []);
     let found = long_sentences(&format!("\n{}.\n", words(26)));
-    assert_eq!((found.len(), found[0].line, found[0].words), (1, 2, 26));
+    assert_eq!((found.len(), found[0].line, found[0].words()), (1, 2, 26));
 }
 
 #[test]

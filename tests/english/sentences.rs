@@ -17,14 +17,27 @@ const UNITS: [&str; 55] = [
 ];
 
 /// A sentence of a text.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Sentence {
     /// Number of the line that it begins in, from 1.
     pub line: usize,
-    /// Number of its words: a code span, a number with its unit and each word of a link's text are one word each.
-    pub words: usize,
-    /// Its text in one line, without the addresses of links.
+    /// Its text in one line, without the addresses of links. A code span has no blanks.
     pub text: String,
+}
+
+impl Sentence {
+    /// Number of words: a code span, a number with its unit and each word of a link's text are one word each.
+    pub fn words(&self) -> usize {
+        let mut words = 0;
+        let mut follows_number = false;
+        for token in self.text.split(' ') {
+            let is_number = is_number(token);
+            let is_part = follows_number && (is_number || is_unit(token));
+            words += usize::from(is_word(token) && !is_part);
+            follows_number = is_number;
+        }
+        words
+    }
 }
 
 /// Returns the sentences of a text.
@@ -35,9 +48,10 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
     let mut skipped = Skipped::Nothing;
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim().trim_start_matches("> ");
-        let is_text = skipped.next(line) && !line.is_empty() && !line.starts_with('|');
-        let item = item(line);
-        if !is_text || item.is_some() || line.starts_with('#') {
+        let is_text = !line.is_empty() && skipped.next(line) && !line.starts_with('|');
+        let item = if is_text { item(line) } else { None };
+        let is_heading = line.starts_with('#');
+        if !paragraph.is_empty() && (!is_text || item.is_some() || is_heading) {
             add_sentences(&paragraph, first, &mut found);
             paragraph.clear();
         }
@@ -46,11 +60,8 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
                 first = number;
             }
             paragraph.push_str(item.unwrap_or(line));
-            paragraph.push('\n');
-        }
-        if line.starts_with('#') {
-            add_sentences(&paragraph, first, &mut found);
-            paragraph.clear();
+            // The next line does not go on with a heading.
+            paragraph.push_str(if is_heading { ".\n" } else { "\n" });
         }
     }
     add_sentences(&paragraph, first, &mut found);
@@ -98,32 +109,31 @@ fn item(line: &str) -> Option<&str> {
 
 /// Adds the sentences of a paragraph that begins in the line `first`.
 fn add_sentences(paragraph: &str, first: usize, found: &mut Vec<Sentence>) {
-    let mut sentence = Sentence { line: first, words: 0, text: String::new() };
-    let mut follows_number = false;
+    let mut sentence = Sentence::default();
     for (number, line) in (first..).zip(plain(paragraph).lines()) {
-        for token in line.split_whitespace() {
+        for token in line.split_ascii_whitespace() {
             if sentence.text.is_empty() {
                 sentence.line = number;
             } else {
                 sentence.text.push(' ');
             }
             sentence.text.push_str(token);
-            let is_number = is_number(token);
-            let is_part = follows_number && (is_number || is_unit(token));
-            sentence.words += usize::from(is_word(token) && !is_part);
-            follows_number = is_number;
-            if token.trim_end_matches(CLOSERS).ends_with(ENDS) {
-                follows_number = false;
-                let next = Sentence { line: number, words: 0, text: String::new() };
-                push(std::mem::replace(&mut sentence, next), found);
+            if is_end(token) {
+                push(std::mem::take(&mut sentence), found);
             }
         }
     }
     push(sentence, found);
 }
 
+/// True for the last word of a sentence.
+fn is_end(token: &str) -> bool {
+    let is_inside = token.ends_with(|c: char| c.is_ascii_alphanumeric() || c == ',' || c == '`');
+    !is_inside && token.trim_end_matches(CLOSERS).ends_with(ENDS)
+}
+
 fn push(sentence: Sentence, found: &mut Vec<Sentence>) {
-    if sentence.words > 0 {
+    if is_word(&sentence.text) {
         found.push(sentence);
     }
 }
@@ -198,7 +208,8 @@ mod tests {
     /// Requires the lines and the numbers of words of the sentences of a text.
     #[track_caller]
     fn require(text: &str, expected: &[(usize, usize)]) {
-        let found: Vec<_> = sentences(text).iter().map(|sentence| (sentence.line, sentence.words)).collect();
+        let found: Vec<_> =
+            sentences(text).iter().map(|sentence| (sentence.line, sentence.words())).collect();
         assert_eq!(found, expected, "{text}");
     }
 
@@ -234,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_text_of_a_sentence_is_in_one_line() {
-        let expected = Sentence { line: 2, words: 3, text: "See page `a_b`.".into() };
+        let expected = Sentence { line: 2, text: "See page `a_b`.".into() };
         assert_eq!(sentences("\nSee [page](x.md)\n`a b`."), [expected]);
     }
 }
