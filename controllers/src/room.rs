@@ -1,10 +1,10 @@
 //! Places of the walls of a room of known size, although other vehicles stand in the beams.
 //!
-//! Along each of the heading's level axes two beams look at two walls whose distance from each other is known,
-//! so each beam shows the vehicle's place on the axis. An object in a beam shortens it, and the place that it
-//! shows is wrong. The place is therefore carried on by the velocity and corrected by the beam that shows nearly
-//! the same. A beam that shows another place is not believed, unless both show it together, which they do
-//! where they see both walls. With both beams blocked the place goes on by velocity alone.
+//! Along each of the heading's level axes two beams look at two walls with a known distance from each other. So
+//! each beam shows the vehicle's place on the axis. An object in a beam shortens it, and the place that it shows
+//! is wrong. The place is therefore carried on by the velocity and corrected by the beam that shows nearly the
+//! same. A beam that shows another place is not believed, unless both show it together, which they do where they
+//! see both walls. With both beams blocked the place goes on by velocity alone.
 
 use bus::messages::WallEstimate;
 

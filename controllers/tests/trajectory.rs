@@ -14,8 +14,8 @@ const EVERYTHING: &str = r#"
       waypoints_m = [[1.0, 0.5, 1.5], [2.0, -0.5, 2.0], [2.5, 0.0, 1.5], [3.0, 1.0, 1.0]] },
     { kind = "minimum-snap", mean_speed_m_s = 1.5, waypoints_m = [[0.0, 0.0, 1.0]] }"#;
 
-/// The greatest difference between a derivative and the central difference of the one below, for each order, over
-/// times that are not within `span_s` of a segment's end, where the snap may jump.
+/// The greatest difference between a derivative and the central difference of the one below, for each order.
+/// Times within `span_s` of a segment's end are left out, since the snap may jump there.
 fn differences(trajectory: &Trajectory, span_s: f64, ends_s: &[f64]) -> [f64; 4] {
     let mut worst = [0.0; 4];
     let steps = (trajectory.duration_s() * 100.0) as usize;

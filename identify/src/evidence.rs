@@ -1,13 +1,13 @@
 //! Evidence that a simulated flight would give on the open questions of an identification.
 //!
-//! **Names.** A flight is simulated under one hypothesis and fitted under a rival, by the weighted least squares and the
-//! noises of the identification, with what the measured flights say about the rival's parameters. The criterion is that of
-//! T-optimality (Atkinson and Fedorov, Biometrika 62, 1975): the weighted squares that the best fit of the rival leaves beyond
-//! those of the truth. The simulated channels have no noise, so that the excess is an expected value. The verdict
-//! compares the squares block by block: an excess g of a block has the variance 4 g by the noise, and the blocks
-//! differ. So the separation is the mean excess in units of its standard error, as Vuong's test (Econometrica 57, 1989) has it.
-//! Both directions are computed, and the smaller counts. What the true hypothesis leaves on channels without noise is the error of the
-//! comparison: a rival is fitted to the rest, and as the noise of the next identification includes it, the excess is divided by as much.
+//! **Names.** A flight is simulated under one hypothesis and fitted under a rival, by the weighted least squares and the noises of the
+//! identification. The fit includes the information of the measured flights on the rival's parameters. The criterion is that of
+//! T-optimality (Atkinson and Fedorov, Biometrika 62, 1975): the weighted squares that the best fit of the rival leaves beyond those of
+//! the truth. The simulated channels have no noise, so that the excess is an expected value. The verdict compares the squares block by
+//! block: an excess g of a block has the variance 4 g by the noise, and the blocks differ. So the separation is the mean excess in units
+//! of its standard error, as Vuong's test (Econometrica 57, 1989) has it. Both directions are computed, and the smaller counts. What the
+//! true hypothesis leaves on channels without noise is the error of the comparison: a rival is fitted to the rest, and as the noise of
+//! the next identification includes it, the excess is divided by as much.
 //!
 //! **Parameters.** The separation is a plausible change in units of the expected standard error, by the information of all
 //! flights together.

@@ -1,9 +1,9 @@
 //! Lateness of measured rotor speeds against the inertial unit: by the torques and the thrust that the rotors make.
 //!
-//! A clock of their own that is 10 ms off turns the phase of a torque at 10 Hz by 36 deg, and inertia and damping come out wrong where rotor
-//! speeds alone drive the model. The model's angular acceleration and specific force under the measured speeds are shifted until they
-//! fit the measured ones best, each component with a gain of its own, as thrust and inertia may be declared wrong. Compared are changes
-//! from one knot to the next: the slow part of a torque balances what no rotor makes.
+//! A clock of their own that is 10 ms off turns the phase of a torque at 10 Hz by 36 deg. Inertia and damping are then wrong if rotor speeds
+//! alone drive the model. The model's angular acceleration and specific force under the measured speeds are shifted until they fit the
+//! measured ones best. Each component has a gain of its own, as thrust and inertia may be declared wrong. Compared are changes from one knot
+//! to the next: the slow part of a torque balances what no rotor makes.
 
 use crate::fit::Problem;
 use crate::normal::Block;

@@ -1,7 +1,7 @@
 //! Attribution: selection of the candidates that the flights support, one after the other.
 //!
-//! In each round every candidate is fitted, together with what was accepted before, on the estimation data, and judged
-//! on the validation data, or without these by cross-validation over blocks of the estimation data. It is accepted only if five things hold:
+//! In each round every candidate is fitted on the estimation data, together with the effects accepted before. It is judged on the validation
+//! data, or without these by cross-validation over blocks of the estimation data. It is accepted only if five things hold:
 //!
 //! 1. The gain on the validation data is beyond chance: the mean of the blocks' gains is above zero at 1 % over all
 //!    candidates of the round together (Bonferroni; one-sided percentile bootstrap over blocks, Efron 1979).
@@ -12,7 +12,7 @@
 //! 5. No effect that was taken before stops at its bound only beside this one.
 //!
 //! The accepted candidate with the greatest gain is taken, or one with fewer parameters if the difference is not
-//! beyond chance. Then those taken before have to pass the first test again, as a later effect may explain the
+//! beyond chance. Then those taken before have to pass the first test again. A later effect may explain the
 //! residual that an earlier one explained by mistake.
 //!
 //! In the end effects are withdrawn or added by predictions, and the search goes on (`revision`).

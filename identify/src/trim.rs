@@ -1,8 +1,8 @@
 //! Trim: the constant torque and force that a vehicle flies against, and whether they are the same in all flights.
 //!
-//! A propeller that was changed or a battery that was strapped on differently shows as a constant acceleration that the
-//! commands of one flight contain and those of another do not. No property of the vehicle explains both. A fit takes trims
-//! for random effects (`whitening`); here they are measured, for the report.
+//! A propeller that was changed or a battery that was moved shows as a constant acceleration. The commands of one flight
+//! contain it and those of another do not. No property of the vehicle explains both. A fit takes trims for random effects
+//! (`whitening`); here they are measured, for the report.
 
 use crate::fit::Problem;
 use crate::prepared::{BOX_STEPS, Equation, Prepared};

@@ -265,8 +265,8 @@ fn gusts_stay_unexplained() {
     assert!(found.verdict.iter().all(|name| random.contains(name)), "only air may stand in for air: {found}");
 }
 
-/// Above a hover that hardly moves, where thrust and weight only have to be equal, a heavier vehicle and weaker rotors
-/// leave the same trace, and the report says so.
+/// In a hover that hardly moves, thrust and weight only have to be equal. A heavier vehicle and weaker rotors leave
+/// the same trace, and the report says so.
 #[test]
 fn in_a_calm_hover_mass_and_thrust_are_told_to_be_alike() {
     let mut case = Case::of(&["mass-error"], 1.0, 23, DURATION_S);

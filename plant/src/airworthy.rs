@@ -19,7 +19,7 @@ const LIFT_MAX: f64 = 1000.0;
 /// Standard gravity, m/s² (ISO 80000-3): rotors are as strong as they are wherever they fly.
 const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// The classic Runge-Kutta method of fourth order diverges where a pole times the step leaves a region that reaches to
+/// The classic Runge-Kutta method of fourth order diverges if a pole times the step leaves a region. This reaches to
 /// 2.785 on the real axis and 2.828 on the imaginary one (Hairer and Wanner, Solving Ordinary Differential Equations II,
 /// 1996, section IV.2); the circle of 2.5 about 0 lies within it on the left.
 pub(crate) const POLE_STEPS_MAX: f64 = 2.5;

@@ -1,10 +1,9 @@
 //! From measuring to arriving: the times of a sensor's measurements, their delays, and their losses.
 //!
-//! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple
-//! of 1 / `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a
-//! queue that is part of the node's hand-over state, so that a backup goes on with the measurements under way. The queue is
-//! as long as delay and rate need. Rate
-//! and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
+//! A sensor's node computes at each of its periods. It *measures* at the first of them at or after each multiple of 1 /
+//! `rate_hz`; a measurement *arrives* at the first at or after `delay_ms` later. In between it waits in a queue of the
+//! node's hand-over state, so that a backup goes on with the measurements under way. The queue is as long as delay and rate
+//! need. Rate and delay are therefore exact where they are multiples of the node's period, and rounded up to it elsewhere;
 //! a measurement always holds the truth of its stated time.
 //!
 //! Losses follow a two-state Markov chain (Gilbert, "Capacity of a burst-noise channel", Bell System Technical

@@ -1,10 +1,10 @@
 //! Ultrasonic beam: the nearest object in its cone.
 //!
-//! A beam widens from the body's centre of mass about one of its axes. Flat things, the ground and the boxes of a
-//! scene, are found with rays: one along the axis, eight at half of the cone's half angle and eight at its edge.
-//! No direction in a cone of half angle h is further than 0.42 h from a ray, so a wall whose normal lies in the
-//! cone is seen at most 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is
-//! known without rays, and so is that of balls.
+//! A beam widens from the body's centre of mass about one of its axes. Flat things, the ground and the boxes of a scene,
+//! are found with rays: one along the axis, eight at half of the cone's half angle and eight at its edge. No direction
+//! in a cone of half angle h is further than 0.42 h from a ray. So a wall whose normal lies in the cone is seen at most
+//! 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is known without rays,
+//! and so is that of balls.
 
 use bus::component::StepError;
 use bus::context::NodeContext;

@@ -6,7 +6,7 @@
 //! whenever its topic's publisher sends. Until the first has come, the output is the input's initial value with
 //! a stamp of -1 s.
 //!
-//! A message that is sent at tick k is queued at the time of that tick, and is out at the first tick of the link at which
+//! A message that is sent at tick k is queued at the time of that tick. It is out at the first tick of the link at which
 //! it has arrived. The link itself adds nothing to that: its inputs are a tick late because no message arrives in the tick
 //! in which it is sent.
 

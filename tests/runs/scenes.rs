@@ -128,7 +128,7 @@ fn start_of(number: usize) -> ([f64; 3], f64) {
     }
 }
 
-/// Twenty vehicles of the hover's set in the room of the thesis, each with its own estimator and controller, and in the world of each the
+/// Twenty vehicles of the hover's set in the room of the thesis, each with its own estimator and controller. The world of each has the
 /// others.
 fn twenty() -> String {
     let vehicle = |number: usize| {

@@ -42,8 +42,8 @@ impl Table {
     /// else those that the file shows.
     ///
     /// # Errors
-    /// A file of another format, without a header, with commas of two meanings, with millions of rows, or with a cell that
-    /// is opened by a quotation mark and not closed on its line.
+    /// A file of another format, without a header, with commas of two meanings, or with millions of rows. A cell that is
+    /// opened by a quotation mark and not closed on its line.
     pub fn parse(bytes: &[u8], wanted: &[&str], dialect: &Dialect) -> Result<Self, TableError> {
         Self::parse_within(ROWS_MAX, bytes, wanted, dialect)
     }

@@ -1,8 +1,8 @@
 //! FMUs in a run: `kind = "fmu"` of a manifest is a co-simulation FMU of FMI 2.0 or 3.0.
 //!
 //! The process that holds an FMU holds nothing else, since an FMU is a library of others that may crash. At each due tick its
-//! mapped input variables are set from the newest samples, it steps over one period, and its mapped output variables
-//! become the samples of this tick.
+//! mapped input variables are set from the newest samples, and it steps over one period. Its mapped output variables become
+//! the samples of this tick.
 //!
 //! | room | content |
 //! |---|---|

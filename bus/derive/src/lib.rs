@@ -1,8 +1,8 @@
 //! `#[derive(Message)]`: a fixed-layout message with its schema, checked when it is compiled; `#[derive(InputPorts)]` and
 //! `#[derive(OutputPorts)]`, the ports of a component; `#[derive(Parameters)]`, its parameters.
 //!
-//! The derive refuses a struct that is not `repr(C)`, has implicit padding, has a field name that
-//! ROS 2 tools reject, or has a floating-point field that does not state its unit.
+//! The derive refuses a struct that is not `repr(C)`, has implicit padding, or has a field name that ROS 2
+//! tools reject. A floating-point field without its unit is refused too.
 
 mod fields;
 mod parameters;

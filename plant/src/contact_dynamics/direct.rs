@@ -3,12 +3,12 @@
 //! Friction cones are scaled to be their own duals, and each rate is shifted along its normal by μ times the
 //! slip. Then Coulomb's and Signorini's laws say that impulse and shifted rate lie in the cone and are
 //! orthogonal (G. De Saxcé and Z.-Q. Feng, The bipotential method, 1998). For a given shift that is a convex
-//! problem, which an interior-point method solves for any ratio of the masses (Mehrotra's predictor and
-//! corrector, in the scaling of Nesterov and Todd). The shift is then found by fixed-point iteration (F.
-//! Cadoux, An optimization-based algorithm for Coulomb's frictional contact, 2009). The impulses make no energy
-//! at any shift.
+//! problem. An interior-point method solves it for any ratio of the masses (Mehrotra's predictor and corrector,
+//! in the scaling of Nesterov and Todd). The shift is then found by fixed-point iteration (F. Cadoux, An
+//! optimization-based algorithm for Coulomb's frictional contact, 2009). The impulses make no energy at any
+//! shift.
 //!
-//! Unknowns are the bodies' twists in units of the square root of energy, so that a matrix has six rows for each body, and
+//! Unknowns are the bodies' twists in units of the square root of energy. So a matrix has six rows for each body, and
 //! masses do not show in it.
 
 use super::cholesky::{factorise, substitute};

@@ -1,8 +1,9 @@
 //! The fastest pole of damped and driven joints, which the step of the integration has to follow.
 //!
-//! Springs of stiffnesses K and dampers D along rows whose rates answer to forces by A = J W Jᵀ obey s² + A D s + A K = 0. For
-//! an eigenvector this is a quadratic equation with a damping of at most λ(A D) and a stiffness of at most λ(A K), so no pole is
-//! faster than the larger of λ(A D) and √λ(A K). The sums of rows of √D A √D and √K A √K bound these (Gershgorin).
+//! Springs of stiffnesses K and dampers D act along rows. The rates of the rows answer to forces by A = J W Jᵀ. They obey s² +
+//! A D s + A K = 0. For an eigenvector this is a quadratic equation. Its damping is at most λ(A D) and its stiffness at most
+//! λ(A K). So no pole is faster than the larger of λ(A D) and √λ(A K). The sums of rows of √D A √D and √K A √K bound these
+//! (Gershgorin).
 
 use super::joints::Line;
 use nalgebra::{Matrix6, Vector6};
@@ -19,7 +20,7 @@ pub(super) struct Spring {
     pub damping: f64,
 }
 
-/// The joint with the fastest pole, and a bound of the rate of that, 1/s, where the bodies yield by these `mobilities` and
+/// The joint with the fastest pole, and a bound of the rate of that, 1/s. The bodies yield by these `mobilities`, and
 /// nothing else holds them. The bound is exact of a spring whose bodies no other one acts on.
 pub(super) fn fastest(springs: &[Spring], mobilities: &[Matrix6<f64>]) -> Option<(usize, f64)> {
     let answer =

@@ -193,8 +193,8 @@ pub(super) fn hung(rig: &Rig, body: &RigidBody) -> RigidBody {
 }
 
 /// True if the rig keeps a vehicle at rest where it is. A rig that does not heave always does. Any other does
-/// so at the lower end of its travel, unless `lift_N`, the force on the vehicle beyond its weight, raises the
-/// mass that hangs there.
+/// so at the lower end of its travel, unless `lift_N` raises the mass that hangs there. This is the force on
+/// the vehicle beyond its weight.
 pub(super) fn holds(rig: &Rig, body: &RigidBody, lift_N: f64, gravity_m_s2: f64) -> bool {
     let raised_m = off_W_m(rig, &hung(rig, body)).z;
     let needed_N = rig.moving_mass_kg * gravity_m_s2 + rig.slide_friction_N;

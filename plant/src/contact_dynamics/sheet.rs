@@ -1,6 +1,6 @@
 //! Meshes of triangles that touch with their borders too, as the edge of a door or of a sheet of metal.
 //!
-//! Parry lets a triangle push only along its normal, bent over the edges that it shares with others, so that
+//! Parry lets a triangle push only along its normal, bent over the edges that it shares with others. So
 //! nothing catches on the edge between two triangles of one face. An edge that no other triangle continues has
 //! no such bend. Parry turns a push against it into one along the triangle's normal, so a vehicle in the plane
 //! of a sheet flies through it. Here a border pushes in every direction that leads away from it.

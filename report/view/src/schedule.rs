@@ -1,7 +1,7 @@
 //! The tick of a live run as it is planned, beside the tick as it goes.
 //!
-//! The plan of the run, as it was at its start, has hosts, cores, periods, and the samples of a tick that each node waits for. The last second is read
-//! from the control segment and the kernel, as by `hummingbus top`, which disturbs no process.
+//! The plan of the run, as it was at its start, has hosts, cores and periods. It has the samples of a tick that each node waits for. The last second
+//! is read from the control segment and the kernel, as by `hummingbus top`, which disturbs no process.
 
 use bus::computing_time::ComputingTime;
 use bus::plan::{NodePlan, Plan};

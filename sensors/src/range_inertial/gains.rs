@@ -2,8 +2,8 @@
 //!
 //! A late velocity is compared with the *present* estimate of the velocity then: that of now, less the gain
 //! since. The estimate of that time would not do. Corrections made since, by earlier samples, would be found
-//! missing again and made once more (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking
-//! and Navigation, section 7.7, on measurements that are out of sequence).
+//! missing again and made once more. Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking
+//! and Navigation, section 7.7, treats measurements that are out of sequence.
 
 use crate::wire::{vector, vector_message};
 use bus::Message;
