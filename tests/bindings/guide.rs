@@ -1,7 +1,9 @@
 //! The shell commands of README, the first hour and all other pages, as a reader runs them: in a copy of the repository.
 
 use crate::pages;
-use crate::shell::{Exception, commands, copy, left_out, path, replaced, require_commands, run, shortened};
+use crate::shell::{
+    Exception, blocks, commands, copy, left_out, negative, path, replaced, require_commands, run, shortened,
+};
 use crate::skipped::cases;
 use crate::support::{HUMMINGBUS, Place, repository};
 use std::collections::BTreeSet;
@@ -10,6 +12,7 @@ use std::path::Path;
 
 const README: &str = "README.md";
 const FIRST_HOUR: &str = "docs/first-hour.md";
+const TUTORIAL: &str = "docs/manifest.md";
 
 /// A page whose commands run within seconds.
 struct Page {
@@ -23,7 +26,7 @@ struct Page {
 }
 
 /// The pages that run, beside README, the first hour and those about other languages.
-const PAGES: [Page; 9] = [
+const PAGES: [Page; 12] = [
     Page {
         name: "docs/airframe.md",
         // Too short for its conditions.
@@ -35,7 +38,15 @@ const PAGES: [Page; 9] = [
     Page {
         name: "docs/checkpoints.md",
         before: "",
-        made: &["manifests/hover.6000.ckpt", "manifests/hover.from-6000.mcap"],
+        made: &["manifests/hover.6000.ckpt", "manifests/hover.from-6000.mcap", "windy.mcap"],
+        is_quick: false,
+    },
+    Page { name: "docs/conditions.md", before: "", made: &[], is_quick: true },
+    Page {
+        name: "docs/hot-swap.md",
+        before: "hummingbus run manifests/hover.toml --pace realtime --set run.duration_s=600 --record live.mcap &
+echo 'parameters.gains.roll = { proportional_1_s2 = 20.0, integral_1_s3 = 0.0, derivative_1_s = 7.0 }' >my-controller.toml",
+        made: &["live.mcap"],
         is_quick: true,
     },
     Page {
@@ -67,6 +78,12 @@ hummingbus run manifests/wall-follow-varying.toml --record laps.mcap --set run.d
         is_quick: true,
     },
     Page {
+        name: "docs/rotor-stand.md",
+        before: "",
+        made: &["manifests/thesis/propeller-steps.mcap", "rotor/rotor.toml"],
+        is_quick: true,
+    },
+    Page {
         name: "docs/vehicles.md",
         before: "cp vehicles/tests/models/plus.urdf quad.urdf",
         made: &["my-drone.toml", "hexa/flights.toml", "hexa/truth.toml", "quad.toml"],
@@ -76,7 +93,10 @@ hummingbus run manifests/wall-follow-varying.toml --record laps.mcap --set run.d
 
 /// The pages of which no command runs here, and why.
 const LEFT_OUT: [(&str, &str); 12] = [
-    ("docs/campaigns.md", "thousands of flights; tests/runs/campaign.rs flies campaigns"),
+    (
+        "docs/campaigns.md",
+        "thousands of flights, and a cluster; tests/runs/campaign.rs and tests/runs/slurm.rs have small ones",
+    ),
     ("docs/faults.md", "its commands run tests/faults and scripts/soak, for minutes or hours"),
     (
         "docs/firmware.md",
@@ -84,7 +104,7 @@ const LEFT_OUT: [(&str, &str); 12] = [
     ),
     (
         "docs/real-flights.md",
-        "it needs data that are downloaded; tests/runs/identify.rs has those that are there",
+        "it needs data that are downloaded; identify/tests/real.rs reads those that are there",
     ),
     ("docs/replay.md", "it downloads data; tests/runs/replay.rs flies those that are there"),
     (
@@ -93,7 +113,7 @@ const LEFT_OUT: [(&str, &str); 12] = [
     ),
     (
         "docs/timing.md",
-        "`pgrep` finds processes of other runs on this machine; tests/runs/backups.rs kills those of its own",
+        "`pgrep` finds processes of other runs on this machine; tests/faults/survival.rs kills those of its own",
     ),
     ("docs/tuning.md", "minutes of search; tests/runs/tune.rs tunes"),
     ("docs/validation-bus.md", "minutes of identification, and ten cases of scripts/next_flight_cases"),
@@ -103,7 +123,7 @@ const LEFT_OUT: [(&str, &str); 12] = [
 ];
 
 /// All commands of these pages that do not run as they are written.
-static EXCEPTIONS: [Exception; 23] = [
+static EXCEPTIONS: [Exception; 38] = [
     replaced(
         "scripts/fly",
         "target/release/hummingbus run manifests/hover.toml",
@@ -150,6 +170,50 @@ static EXCEPTIONS: [Exception; 23] = [
         "cargo test --manifest-path controller/Cargo.toml",
         "it compiles; tests/project_controller.rs runs the same test",
     ),
+    negative(
+        "hummingbus run --from manifests/hover.6000.ckpt --set process.plant.vehicle.body.mass=0.55 --record heavy.mcap",
+        "the heavier vehicle sinks",
+    ),
+    negative(
+        "hummingbus run --from manifests/hover.6000.ckpt --set process.plant.vehicle.body.mass=0.60 --record heavier.mcap",
+        "the heavier vehicle sinks",
+    ),
+    negative("hummingbus diff heavy.mcap heavier.mcap", "they differ"),
+    negative(
+        "hummingbus run --from manifests/hover.6000.ckpt --set process.controller.gains=../controllers/gains/pid.toml \
+         --set process.controller.gains.roll.derivative=9 --record damped.mcap",
+        "roll follows late",
+    ),
+    left_out(
+        "hummingbus run --from manifests/hover.6000.ckpt --fork 100 \
+         --set process.controller.gains=../controllers/gains/pid.toml \
+         --vary process.controller.gains.roll.derivative=factor:uniform:0.9,1.1 --out target/gains",
+        "100 flights; tests/runs/forks.rs forks",
+    ),
+    left_out(
+        "hummingbus run --from manifests/hover.6000.ckpt --fork 100 \
+         --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1",
+        "100 flights; tests/runs/forks.rs forks",
+    ),
+    left_out("hummingbus ctl pause", "no run is alive; tests/runs/rewinds.rs has one"),
+    left_out("hummingbus ctl rewind", "no run is alive; tests/runs/rewinds.rs has one"),
+    left_out("hummingbus ctl resume", "no run is alive; tests/runs/rewinds.rs has one"),
+    replaced(
+        "hummingbus swap controller --with my-controller.toml",
+        "hummingbus swap controller --with my-controller.toml\nhummingbus ctl stop",
+        "the flight of the test ends",
+    ),
+    negative(
+        "hummingbus run first.toml --set process.plant.vehicle.body.mass=0.53 --record heavy.mcap",
+        "the heavier vehicle sinks",
+    ),
+    left_out(
+        "hummingbus view first.mcap heavy.mcap",
+        "it serves a browser until it is ended: tests/runs/view.rs",
+    ),
+    left_out("pip install rerun-sdk==0.41.0 mcap-ros2-support", "tests/readers/requirements.txt has them"),
+    left_out("python3 scripts/rerun_view.py hover.mcap hover.rrd", "tests/readers/plot.rs runs it"),
+    left_out("rerun hover.rrd", "it opens a window"),
     left_out("cargo build --release", "it compiles for release"),
     shortened(
         "scripts/make_flights walk --program target/release/hummingbus --fit 1 --test 2 --seed 7 --effect com-offset:x=0.006 \
@@ -221,7 +285,7 @@ fn all() -> BTreeSet<String> {
 
 /// The pages of this room that run.
 fn running() -> Vec<&'static str> {
-    [README, FIRST_HOUR].into_iter().chain(PAGES.iter().map(|page| page.name)).collect()
+    [README, FIRST_HOUR, TUTORIAL].into_iter().chain(PAGES.iter().map(|page| page.name)).collect()
 }
 
 #[test]
@@ -265,6 +329,14 @@ fn the_commands_of_the_first_hour_run() {
     let made = made.map(|file| format!("drone/{file}"));
     let made: Vec<&str> = made.iter().map(String::as_str).chain(["drone/campaign/report.html"]).collect();
     assert_eq!(run_page(&place, FIRST_HOUR, "", &made), 15);
+}
+
+/// As the page says, `first.toml` holds its blocks, one below the other.
+#[test]
+fn the_commands_of_the_tutorial_run() {
+    let place = copy();
+    fs::write(place.path("manifests/first.toml"), blocks(TUTORIAL, "toml").join("\n")).unwrap();
+    assert_eq!(run_page(&place, TUTORIAL, "", &["manifests/first.mcap", "manifests/heavy.mcap"]), 4);
 }
 
 #[test]

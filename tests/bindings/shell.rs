@@ -13,8 +13,27 @@ use std::process::Command;
 const WATCHDOG_S: &str = "300";
 
 /// Folders and files of the repository that the commands read.
-const READ: [&str; 9] =
-    ["bindings", "controllers", "docs", "examples", "flights", "scenes", "scripts", "vehicles", "Cargo.toml"];
+const READ: [&str; 8] =
+    ["bindings", "controllers", "docs", "examples", "scenes", "scripts", "vehicles", "Cargo.toml"];
+/// Folders whose files name others by paths that begin beside their folder, or that runs write into: they are copied.
+const COPIED: [&str; 2] = ["flights", "manifests"];
+
+/// What a command of a page may begin with. Others, such as those that install or download, run only in place of one.
+const ALLOWED: [&str; 13] = [
+    "hummingbus ",
+    "target/release/hummingbus ",
+    "scripts/make_flights ",
+    "python3 -m pythonfmu ",
+    "cmake ",
+    "fmpy ",
+    "cp vehicles/",
+    "cd ",
+    "export PATH=",
+    "V=$PWD/",
+    "for ",
+    "done",
+    "wait",
+];
 
 /// A command of a page that is not run as it is written.
 pub struct Exception {
@@ -23,31 +42,44 @@ pub struct Exception {
     instead: Option<&'static str>,
     /// True if the thorough tests run the command itself.
     is_heavy: bool,
+    /// True if the command itself runs, and has to exit with 1.
+    is_negative: bool,
     reason: &'static str,
 }
 
 /// A command that the tests do not run.
 pub const fn left_out(command: &'static str, reason: &'static str) -> Exception {
-    Exception { command, instead: None, is_heavy: false, reason }
+    Exception { command, instead: None, is_heavy: false, is_negative: false, reason }
 }
 
 /// A command with another one in its place.
 pub const fn replaced(command: &'static str, instead: &'static str, reason: &'static str) -> Exception {
-    Exception { command, instead: Some(instead), is_heavy: false, reason }
+    Exception { command, instead: Some(instead), is_heavy: false, is_negative: false, reason }
 }
 
 /// A command that runs as it is written in the thorough tests, and elsewhere as `instead`.
 pub const fn shortened(command: &'static str, instead: &'static str, reason: &'static str) -> Exception {
-    Exception { command, instead: Some(instead), is_heavy: true, reason }
+    Exception { command, instead: Some(instead), is_heavy: true, is_negative: false, reason }
+}
+
+/// A command whose answer is negative: exit code 1.
+pub const fn negative(command: &'static str, reason: &'static str) -> Exception {
+    Exception { command, instead: None, is_heavy: false, is_negative: true, reason }
+}
+
+/// The blocks of `page` that begin with this word.
+pub fn blocks(page: &str, fence: &str) -> Vec<String> {
+    let text = fs::read_to_string(repository(page)).unwrap();
+    let blocks =
+        text.split(&format!("\n```{fence}\n")).skip(1).map(|rest| rest.split("\n```").next().unwrap());
+    blocks.map(str::to_owned).collect()
 }
 
 /// The commands in the shell blocks of `page`, without their comments. A command that continues on the next line is one;
 /// `&&` joins several.
 pub fn commands(page: &str) -> Vec<String> {
-    let text = fs::read_to_string(repository(page)).unwrap();
-    let blocks = text.split("\n```sh\n").skip(1).map(|rest| rest.split("\n```").next().unwrap());
-    let joined = blocks.map(|block| block.split("\\\n").map(str::trim_start).collect::<String>());
-    let joined: Vec<String> = joined.collect();
+    let joined = |block: String| block.split("\\\n").map(str::trim_start).collect::<String>();
+    let joined: Vec<String> = blocks(page, "sh").into_iter().map(joined).collect();
     let lines = joined.iter().flat_map(|block| block.lines()).map(|line| line.split(" #").next().unwrap());
     let commands = lines.flat_map(|line| line.split("&&")).map(|command| command.trim().to_owned());
     commands.filter(|command| !command.is_empty()).collect()
@@ -61,16 +93,17 @@ pub fn require_commands(exceptions: &[Exception], pages: &[&str]) {
     }
 }
 
-/// The repository as a reader has it after a build: the program is the one under test. Manifests are a copy, since paths
-/// in them begin beside their folder.
+/// The repository as a reader has it after a build: the program is the one under test.
 pub fn copy() -> Place {
     let place = Place::new();
     for name in READ {
         symlink(repository(name), place.path(name)).unwrap();
     }
-    let mut copy = Command::new("cp");
-    copy.args(["-r", &repository("manifests"), &place.path("manifests")]);
-    succeed(copy);
+    for name in COPIED {
+        let mut copy = Command::new("cp");
+        copy.args(["-r", &repository(name), &place.path(name)]);
+        succeed(copy);
+    }
     fs::create_dir(place.path("target")).unwrap();
     symlink(Path::new(HUMMINGBUS).parent().unwrap(), place.path("target/release")).unwrap();
     place
@@ -79,9 +112,17 @@ pub fn copy() -> Place {
 /// What runs in place of `command`; nothing if it is left out.
 fn substitute(page: &str, command: &str, exceptions: &[Exception]) -> Option<String> {
     let Some(exception) = exceptions.iter().find(|exception| exception.command == command) else {
+        let is_allowed = ALLOWED.iter().any(|start| command.starts_with(start));
+        assert!(
+            is_allowed,
+            "{page}: `{command}` is not a command that tests run: add it to `EXCEPTIONS` or `ALLOWED`"
+        );
         return Some(command.to_owned());
     };
-    let Exception { instead, is_heavy, reason, .. } = exception;
+    let Exception { instead, is_heavy, is_negative, reason, .. } = exception;
+    if *is_negative {
+        return Some(format!("code=0; {command} || code=$?; test $code = 1"));
+    }
     if *is_heavy && is_thorough() {
         return Some(command.to_owned());
     }

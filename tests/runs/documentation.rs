@@ -236,6 +236,16 @@ fn the_component_of_the_readme_is_the_one_that_is_flown() {
     assert!(used.into_iter().all(|name| package["dependencies"].get(name).is_some()), "{package}");
 }
 
+#[test]
+fn the_test_of_the_readme_is_the_one_that_runs() {
+    let run = fs::read_to_string(repository("tests/runs/readme.rs")).unwrap();
+    let [printed] = &code_blocks("README.md", "rust")[..] else { panic!("one block of Rust") };
+    assert!(
+        run.ends_with(&format!("\n\n{printed}\n")),
+        "README.md has another test than tests/runs/readme.rs"
+    );
+}
+
 /// The table of languages in the README states the lengths of its examples.
 #[test]
 fn the_examples_of_the_readme_have_as_many_lines_as_it_says() {

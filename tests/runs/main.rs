@@ -40,6 +40,7 @@
 //! - [`untrusted`]: names and contents of files that others made
 //! - [`envelope`]: flights beyond the envelope in which a model was validated
 //! - [`replay`]: the measured flight
+//! - [`mod@readme`]: the test that README prints
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
@@ -91,6 +92,7 @@ mod plot;
 mod processes;
 mod processors;
 mod profile;
+mod readme;
 mod recordings;
 mod refusals;
 mod refused_conditions;
