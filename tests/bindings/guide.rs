@@ -341,7 +341,7 @@ fn the_commands_of_the_tutorial_run() {
 
 #[test]
 fn the_commands_of_the_other_pages_run() {
-    for Page { name, before, made, .. } in cases("pages", PAGES, |page| page.is_quick) {
+    for Page { name, before, made, .. } in cases("pages", PAGES, |page: &Page| page.is_quick) {
         let count = run_page(&copy(), name, before, made);
         println!("{name}: {count} commands have run");
     }

@@ -40,7 +40,8 @@
 //! - [`untrusted`]: names and contents of files that others made
 //! - [`envelope`]: flights beyond the envelope in which a model was validated
 //! - [`replay`]: the measured flight
-//! - [`mod@readme`]: the test that README prints
+//! - [`file_keys`]: the pages of vehicle and scene files have every key
+//! - [`readme`]: the test that README prints
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
 //! - [`scenes`]: ground, walls, rigs and other vehicles
@@ -72,6 +73,7 @@ mod determinism;
 mod documentation;
 mod envelope;
 mod failures;
+mod file_keys;
 mod forks;
 mod forks_of_effects;
 mod foxglove;
