@@ -18,7 +18,7 @@ const READ: [&str; 8] =
 /// Folders whose files name others by paths that begin beside their folder, or that runs write into: they are copied.
 const COPIED: [&str; 2] = ["flights", "manifests"];
 
-/// What a command of a page may begin with. Others, such as those that install or download, run only in place of one.
+/// Beginnings of the commands that run as they are written. Others, such as those that install or download, need an exception.
 const ALLOWED: [&str; 13] = [
     "hummingbus ",
     "target/release/hummingbus ",
@@ -70,8 +70,8 @@ pub const fn negative(command: &'static str, reason: &'static str) -> Exception 
 /// The blocks of `page` that begin with this word.
 pub fn blocks(page: &str, fence: &str) -> Vec<String> {
     let text = fs::read_to_string(repository(page)).unwrap();
-    let blocks =
-        text.split(&format!("\n```{fence}\n")).skip(1).map(|rest| rest.split("\n```").next().unwrap());
+    let opening = format!("\n```{fence}\n");
+    let blocks = text.split(&opening).skip(1).map(|rest| rest.split("\n```").next().unwrap());
     blocks.map(str::to_owned).collect()
 }
 
@@ -109,7 +109,7 @@ pub fn copy() -> Place {
     place
 }
 
-/// What runs in place of `command`; nothing if it is left out.
+/// The commands that run in place of `command`; nothing if it is left out.
 fn substitute(page: &str, command: &str, exceptions: &[Exception]) -> Option<String> {
     let Some(exception) = exceptions.iter().find(|exception| exception.command == command) else {
         let is_allowed = ALLOWED.iter().any(|start| command.starts_with(start));

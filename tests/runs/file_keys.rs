@@ -112,7 +112,7 @@ fn vehicle_of(key: &str, value: &str, unit: &str) -> Result<Vehicle, Diagnostic>
     vehicle_with(key, Some(&number))
 }
 
-/// What the reader expects of the number `key`, as its refusal says, between these words.
+/// The part of a refusal between these words.
 fn expected(error: &Diagnostic, before: &str, after: &str) -> Option<String> {
     let error = error.to_string();
     Some(error.split_once(before)?.1.split_once(after)?.0.to_owned())
