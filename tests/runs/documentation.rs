@@ -335,3 +335,27 @@ fn the_manifest_of_the_tutorial_passes() {
     let ended = place.call(&["run", &place.write("first.toml", text), "--record", "none"]).with_code(0);
     ended.prints(&["passed"]);
 }
+
+/// A reader saves the blocks of the page in a new project. The flights are cut to 4 s. `identify` takes minutes in a build of the
+/// tests: tests/runs/identify.rs runs it on flights of its own.
+#[test]
+fn the_files_of_the_page_on_your_own_drone_are_flown_and_read() {
+    let place = Place::new();
+    let file = |name: &str| place.path(&format!("drone/{name}"));
+    place.call(&["new", &place.path("drone")]).with_code(0);
+    let blocks = code_blocks("docs/your-drone.md", "toml");
+    let names = ["heavy.toml", "truth.toml", "practice.toml", "flights.toml", "blackbox.toml"];
+    assert_eq!(blocks.len(), names.len());
+    for (name, block) in names.iter().zip(&blocks) {
+        place.write(&format!("drone/{name}"), block);
+    }
+    let heavy = format!("process.plant.vehicle={}", file("heavy.toml"));
+    place.call(&["run", &file("hover.toml"), "--set", &heavy, "--record", "none"]).with_code(0);
+    for (flight, seed) in [("flight1.mcap", "run.seed=1"), ("flight2.mcap", "run.seed=2")] {
+        let (practice, recording) = (file("practice.toml"), file(flight));
+        let words = ["run", &practice, "--record", &recording, "--set", seed, "--set", "run.duration_s=4"];
+        place.call(&words).with_code(0);
+    }
+    let read = place.call(&["validate", &file("vehicle.toml"), &file("flights.toml"), "--steps-ahead", "1"]);
+    read.with_code(0).prints(&["flight1", "flight2", "attitude (deg)"]);
+}
