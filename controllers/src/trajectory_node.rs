@@ -108,8 +108,12 @@ impl Component for TrajectoryNode {
 
     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let now_ns = context.time_ns();
-        let path = self.has_path.then(|| self.path(now_ns));
-        Ok(Outputs { reference: Reference::from(&self.at(now_ns)), path })
+        let reference = Reference::from(&self.at(now_ns));
+        if !self.has_path {
+            // Written apart: of an `Option` that is made first, all 7.2 kB would be copied into the outputs.
+            return Ok(Outputs { reference, path: None });
+        }
+        Ok(Outputs { reference, path: Some(self.path(now_ns)) })
     }
 }
 
