@@ -89,9 +89,14 @@ impl Version {
         if self.digest.is_some() {
             return Ok(self.digest.clone());
         }
+        let is_same = || Ok::<_, io::Error>(state(&self.file.metadata()?) == self.state);
+        // A file of data may be large: it is not read in vain.
+        if !is_same()? {
+            return Ok(None);
+        }
         (&self.file).rewind()?;
         let digest = inputs::sha256_of(&self.file)?;
-        Ok((state(&self.file.metadata()?) == self.state).then_some(digest))
+        Ok(is_same()?.then_some(digest))
     }
 
     /// Compares `found` with this one. The bytes are read only where the files differ by their states alone.
@@ -102,9 +107,10 @@ impl Version {
         if self.bytes() != found.bytes() {
             return Comparison::Changed;
         }
-        match (self.sha256(), found.sha256()) {
-            (Ok(Some(first)), Ok(Some(found))) if first == found => Comparison::Same,
-            (Ok(Some(_)), Ok(Some(_))) => Comparison::Changed,
+        let Ok(Some(first)) = self.sha256() else { return Comparison::Unknown };
+        match found.sha256() {
+            Ok(Some(found)) if first == found => Comparison::Same,
+            Ok(Some(_)) => Comparison::Changed,
             _ => Comparison::Unknown,
         }
     }
