@@ -22,13 +22,14 @@ pub fn digits(value: f64) -> String {
 /// assert_eq!([nine_decimals(3.0 * 0.1), nine_decimals(8.0), nine_decimals(36_000.7)], ["0.3", "8", "36000.7"]);
 /// assert_eq!([nine_decimals(2e-9), nine_decimals(-0.1 - 0.2)], ["0.000000002", "-0.3"]);
 /// assert_eq!(nine_decimals(1.7e9 + 0.25), "1700000000.25", "of larger numbers all digits are shown");
+/// assert_eq!(nine_decimals(-1e-12), "0");
 /// ```
 #[must_use]
 pub fn nine_decimals(value: f64) -> String {
     /// Whole numbers above it are not all numbers of their own.
     const WHOLE_MAX: f64 = 9.0e15;
     let billionths = (value * 1e9).round();
-    // A whole number by a power of ten is rounded once, and so has the shortest text.
-    let rounded = if billionths.abs() < WHOLE_MAX { billionths / 1e9 } else { value };
+    // A whole number by a power of ten is rounded once, and so has the shortest text. A sum with zero is never -0.
+    let rounded = if billionths.abs() < WHOLE_MAX { billionths / 1e9 + 0.0 } else { value };
     rounded.to_string()
 }

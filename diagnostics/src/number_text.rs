@@ -29,8 +29,13 @@ const ENDS: [(&str, Dimension, &str); 18] = [
 /// Words before a unit that make another unit of it, as in `noise_density_m_s2_sqrt_hz` and `wind_rad_s_per_m`.
 const JOINING: [&str; 10] = ["sqrt", "per", "1", "n", "m", "rad", "deg", "kg", "s", "s2"];
 
+/// Bytes of the longest text that is read: the time grows with the square of its length.
+const TEXT_MAX: usize = 100;
+/// Whole numbers from here on are not all floats.
+const WHOLE_MAX: f64 = 9.0e15;
+
 /// The number at the start of `text`, and the rest of the text without blanks around it; `None` if the text starts
-/// otherwise.
+/// otherwise, or is longer than any number with a unit.
 ///
 /// ```
 /// assert_eq!(diagnostics::leading_number("-8.5 s"), Some((-8.5, "s")));
@@ -38,7 +43,7 @@ const JOINING: [&str; 10] = ["sqrt", "per", "1", "n", "m", "rad", "deg", "kg", "
 /// ```
 #[must_use]
 pub fn leading_number(text: &str) -> Option<(f64, &str)> {
-    let text = text.trim();
+    let text = Some(text.trim()).filter(|text| text.len() <= TEXT_MAX)?;
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
     let most = text.bytes().take_while(is_part).count();
     // An `e` may begin the unit; no text without a digit is a number.
@@ -94,9 +99,10 @@ fn value(number: f64, rest: &str, unit: Option<&(Dimension, &str)>) -> Option<f6
     format!("{converted:.11e}").parse().ok()
 }
 
-/// The number as a file has it; `None` for a fraction where only whole numbers are.
+/// The number as a file has it; `None` for a fraction or a number out of range where only whole numbers are.
 fn literal(value: f64, is_whole: bool) -> Option<String> {
-    if is_whole { (value.fract() == 0.0).then(|| value.to_string()) } else { Some(format!("{value:?}")) }
+    let fits = value.fract() == 0.0 && value.abs() < WHOLE_MAX;
+    if is_whole { fits.then(|| value.to_string()) } else { Some(format!("{value:?}")) }
 }
 
 #[cfg(test)]
@@ -145,7 +151,13 @@ mod tests {
         let told =
             |text: &str| advice("run.seed", "a whole number, at least 0", &format!("the text {text:?}"));
         assert_eq!(told("7").as_deref(), Some("a number has no quotation marks: write `seed = 7`"));
-        assert_eq!(told("7.5").as_deref(), Some("write the number alone, without quotation marks and unit"));
+        for text in ["7.5", "1e20"] {
+            assert_eq!(
+                told(text).as_deref(),
+                Some("write the number alone, without quotation marks and unit"),
+                "{text}"
+            );
+        }
     }
 
     #[test]
@@ -155,6 +167,7 @@ mod tests {
         assert_eq!(advice("duration_s", "a number", "true"), None);
         assert_eq!(leading_number("1e999"), None);
         assert_eq!(leading_number("é8"), None);
+        assert_eq!(leading_number(&("1".repeat(1 << 20) + &"e".repeat(1 << 20))), None, "in no time");
     }
 
     #[test]
