@@ -142,7 +142,7 @@ fn what_a_link_cannot_carry_is_told_by_the_check() {
     refused("[process.up]\nperiod_ticks = 2\n", &["every 2 ticks", "would miss messages"]);
     refused(
         "[process.down]\nparameters.latency_ms = 40000.0\n",
-        &["are 40000 ms together, expected at most 22756 ms: 180 messages are sent each second"],
+        &["are 40000 ms together, expected at most 22755 ms: 180 messages are sent each second"],
     );
     let long = "[process.down]\nparameters.queue_bytes = 50\n";
     refused(long, &["a message of `estimate` takes 55 bytes", "never be sent"]);

@@ -24,7 +24,7 @@ use crate::settings;
 use bus::component::Info;
 use bus::context::NodeContext;
 use diagnostics::parameter::{refuse, up_to};
-use diagnostics::{ParameterError, digits, nine_decimals};
+use diagnostics::{ParameterError, nine_decimals};
 use frames::{FRAMES, FrameNumbers};
 use outputs::Outputs;
 use remote_control::RemoteControl;
@@ -226,7 +226,7 @@ fn check_period(period_s: f64) -> Result<(), ParameterError> {
     let is_whole = refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
         format!(
             "the period is {} us, expected whole microseconds: ArduPilot's clock cuts each step to them",
-            digits(period_us)
+            nine_decimals(period_us)
         )
     });
     ParameterError::both(is_short, is_whole).map(drop)

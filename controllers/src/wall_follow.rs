@@ -24,7 +24,7 @@ use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
 use bus::component::Info;
 use bus::messages::WallEstimate;
-use diagnostics::digits;
+use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, finite, positive, refuse, require, up_to, within};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
 use serde::Deserialize;
@@ -201,7 +201,7 @@ impl Parameters {
         );
         let least_m = 2.0 * self.distance_m;
         let has_room = size_m.iter().all(|side_m| side_m.is_finite() && *side_m > least_m);
-        let expected = format!("two lengths above 2 distance_m = {} m", digits(least_m));
+        let expected = format!("two lengths above 2 distance_m = {} m", nine_decimals(least_m));
         let room = require("room_m", format_args!("{size_m:?}"), has_room, expected);
         ParameterError::gather([is_constant, room, self.start_within(size_m, has_room)])?;
         let ahead_min_m = self.ahead_min_m.unwrap_or(AHEAD_MIN_M);

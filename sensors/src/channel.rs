@@ -54,10 +54,11 @@ impl Timing {
             fraction_lost("dropout", self.dropout),
             not_negative("dropout_mean_s", self.dropout_mean_s),
         ])?;
-        let (longest_ms, rate_hz) = (UNDER_WAY_MAX / self.rate_hz * 1e3, self.rate_hz);
+        let (longest_us, rate_hz) = (UNDER_WAY_MAX / self.rate_hz * 1e6, self.rate_hz);
+        // Rounded down: whoever writes the number of the message is not refused again.
         let expected = format!(
             "at most {} ms: at {rate_hz} Hz {UNDER_WAY_MAX} measurements are under way then",
-            digits(longest_ms)
+            longest_us.floor() / 1e3
         );
         let delay = require("delay_ms", self.delay_ms, self.under_way() <= UNDER_WAY_MAX, &expected);
         let losses = Losses::new(self);

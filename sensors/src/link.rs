@@ -490,7 +490,7 @@ impl Parameters {
                 "`latency_ms` and `jitter_ms` are {} ms together, expected at most {:.0} ms: {sent_hz:.0} messages are sent each \
                  second, and {UNDER_WAY_MAX} may be under way; shorten the latency, or send less often (`rate_hz`)",
                 digits(self.latency_ms + self.jitter_ms),
-                UNDER_WAY_MAX / sent_hz * 1e3
+                (UNDER_WAY_MAX / sent_hz * 1e3).floor()
             )
         })?;
         if offered_bytes_s > carried_bytes_s * (1.0 + 1e-9) {
