@@ -169,6 +169,33 @@ impl Executed {
         ))
     }
 
+    /// Returns a warning for each file that a word of `programs` names and that was written during the run. The recording of
+    /// another run lists it with other bytes.
+    pub fn end(&self, programs: &[(&str, &Program)]) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for &(name, program) in programs {
+            for path in words(program).map(|(_, path)| path).filter(|path| self.was_written(path)) {
+                let path = path.display();
+                let warning = format!(
+                    "warning: process `{name}`: {path} is a word of its command and was written during the run. {RECORD} lists the \
+                     files of the start, so that recordings of two runs differ; pass the path of an output in `parameters` or \
+                     `environment`"
+                );
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
+        }
+        warnings
+    }
+
+    /// True if another file than at the first look is at `path`, or may be.
+    fn was_written(&self, path: &Path) -> bool {
+        let first = self.0.get(path);
+        Version::at(path)
+            .is_some_and(|found| first.is_none_or(|first| first.compare(&found) != Comparison::Same))
+    }
+
     /// Text of the attachment that lists the noted files of `programs`, in their order; `None` if there are none. It has no times and no
     /// paths but those that the manifest states, so that two runs of the same files have the same text.
     ///
@@ -261,6 +288,26 @@ mod tests {
         assert_eq!(record, expected.parse::<toml::Table>().unwrap());
         let kind = Program { executable: Executable::Command(Vec::new()), ..Program::unknown() };
         assert_eq!(executed.record(&[("imu", &kind)]).unwrap(), None);
+    }
+
+    #[test]
+    fn an_output_among_the_words_is_told_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+        write("law.py", "law");
+        write("old.csv", "1");
+        let program = Program {
+            working_directory: Some(folder.path().to_owned()),
+            ..command(["python3", "law.py", "old.csv", "new.csv"])
+        };
+        let programs = [("pilot", &program), ("pilot", &program)];
+        let mut executed = Executed::default();
+        executed.begin(&programs);
+        assert!(executed.end(&programs).is_empty());
+        write("old.csv", "1, 2");
+        write("new.csv", "1");
+        let told = executed.end(&programs);
+        assert!(told.len() == 2 && told[0].contains("old.csv") && told[1].contains("new.csv"), "{told:?}");
     }
 
     #[test]

@@ -427,6 +427,9 @@ impl<'a> Launcher<'a> {
         let writer = Writer { manifest, graph, run_dir: run_path, stem, files, instances };
         let mut checkpoints = Collector::new(writer, self.host != Host::InProcess);
         let flown = self.fly_in(run_dir, place, manifest, graph, &mut checkpoints, rewinds, executed, on);
+        if flown.is_ok() {
+            executed.end(&graph.ticking_programs()).iter().for_each(|warning| on(RunEvent::Note(warning)));
+        }
         // A user goes back to those of a run that broke.
         let (written, missed) = checkpoints.finish();
         if flown.is_err() || rewinds.is_asked() {
