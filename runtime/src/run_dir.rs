@@ -466,34 +466,64 @@ fn live_run(path: &Path) -> Option<LiveRun> {
     Some(LiveRun { entry, file }).filter(LiveRun::is_live)
 }
 
-/// The live run named `run_id`, or the only one.
+/// Where a command was started: its folder, and the number of its terminal, `None` if it has none.
+struct Here {
+    folder: PathBuf,
+    terminal: Option<u32>,
+}
+
+impl Here {
+    fn of_this_process() -> Self {
+        Self { folder: std::env::current_dir().unwrap_or_default(), terminal: terminal() }
+    }
+
+    /// True if the run of `entry` was started here, too.
+    fn has(&self, entry: &Entry) -> bool {
+        entry.folder == self.folder && entry.terminal == self.terminal
+    }
+}
+
+/// True if a run is alive that was started in this folder and on this terminal.
+///
+/// ```
+/// assert!(!runtime::run_dir::is_own_alive(), "this process flies none");
+/// ```
+#[must_use]
+pub fn is_own_alive() -> bool {
+    let here = Here::of_this_process();
+    live_runs().iter().any(|run| here.has(&run.entry))
+}
+
+/// The live run named `run_id`. Without a name, the only one, or of several the only one that was started in this folder and on
+/// this terminal.
 ///
 /// # Errors
 /// If there is no such run, or several to choose from; the error lists the live runs.
 pub fn find_live(run_id: Option<&str>) -> Result<LiveRun, Error> {
-    Ok(choose(live_runs(), run_id)?)
+    Ok(choose(live_runs(), run_id, &Here::of_this_process())?)
 }
 
-/// The live run that a command is to change: the one named `run_id`, or the only one, if it was started in this folder and on this
-/// terminal.
+/// The live run that a command is to change, as [`find_live`] finds it. Without a name, it must have been started in this folder and
+/// on this terminal.
 ///
 /// # Errors
 /// As [`find_live`], or if the only run was started elsewhere: it may be somebody's long flight.
 pub fn find_own(run_id: Option<&str>) -> Result<LiveRun, Error> {
     let run = find_live(run_id)?;
     if run_id.is_none() {
-        require_here(&run.entry, &std::env::current_dir().unwrap_or_default(), terminal())?;
+        require_here(&run.entry, &Here::of_this_process())?;
     }
     Ok(run)
 }
 
-fn require_here(entry: &Entry, folder: &Path, terminal: Option<u32>) -> anyhow::Result<()> {
-    let elsewhere = if entry.folder != folder {
-        format!("in another folder, {}", entry.folder.display())
-    } else if entry.terminal != terminal {
+fn require_here(entry: &Entry, here: &Here) -> anyhow::Result<()> {
+    if here.has(entry) {
+        return Ok(());
+    }
+    let elsewhere = if entry.folder == here.folder {
         "on another terminal".to_owned()
     } else {
-        return Ok(());
+        format!("in another folder, {}", entry.folder.display())
     };
     let Entry { run_id, manifest, .. } = entry;
     bail!(
@@ -512,7 +542,11 @@ pub fn run_of_launcher(launcher: u32) -> Option<LiveRun> {
     live_runs().into_iter().find(|run| run.entry.launcher == launcher)
 }
 
-fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>) -> anyhow::Result<LiveRun> {
+fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>, here: &Here) -> anyhow::Result<LiveRun> {
+    let is_own = |run: &LiveRun| run_id.is_none() && here.has(&run.entry);
+    if runs.iter().filter(|run| is_own(run)).count() == 1 {
+        runs.retain(is_own);
+    }
     let is_chosen = |run: &LiveRun| run_id.is_none_or(|run_id| run.entry.run_id == run_id);
     let index = runs.iter().position(is_chosen);
     match (index, run_id, runs.len()) {
@@ -533,7 +567,7 @@ fn listed(runs: &[LiveRun]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{
-        Entry, LiveRun, choose, dir_name, entry_path, is_run_id, register, require_here, run_of_dir,
+        Entry, Here, LiveRun, choose, dir_name, entry_path, is_run_id, register, require_here, run_of_dir,
         run_of_shared_memory, try_claim, with_room,
     };
     use diagnostics::{ComponentFailure, Diagnostic, Error};
@@ -610,7 +644,8 @@ mod tests {
     fn a_run_of_another_folder_or_terminal_is_changed_by_its_name_alone() {
         let run = runs(&["1-a"]).remove(0);
         let here = |folder: &str, terminal| {
-            require_here(&run.entry, Path::new(folder), terminal).map_err(|error| error.to_string())
+            let here = Here { folder: folder.into(), terminal };
+            require_here(&run.entry, &here).map_err(|error| error.to_string())
         };
         assert_eq!(here("/f", Some(7)), Ok(()));
         let error = here("/g", Some(7)).unwrap_err();
@@ -621,7 +656,9 @@ mod tests {
 
     #[test]
     fn the_only_run_is_the_default_and_several_are_listed() {
-        let chosen = |names: &[&str], run_id| choose(runs(names), run_id).map(|run| run.entry.run_id);
+        let elsewhere = Here { folder: "/g".into(), terminal: Some(7) };
+        let chosen =
+            |names: &[&str], run_id| choose(runs(names), run_id, &elsewhere).map(|run| run.entry.run_id);
         assert_eq!(chosen(&["1-a"], None).unwrap(), "1-a");
         assert_eq!(chosen(&["1-a", "2-b"], Some("2-b")).unwrap(), "2-b");
         let message = |names: &[&str], run_id| chosen(names, run_id).unwrap_err().to_string();
@@ -629,6 +666,20 @@ mod tests {
         for text in [message(&["1-a", "2-b"], None), message(&["1-a", "2-b"], Some("3-c"))] {
             assert!(text.contains("\n  1-a  /m.toml  (launcher 1)\n  2-b  /m.toml"), "{text}");
         }
+    }
+
+    #[test]
+    fn of_several_runs_the_only_one_that_was_started_here_is_the_default() {
+        let chosen = |own: &[usize], run_id| {
+            let mut runs = runs(&["1-a", "2-b", "3-c"]);
+            own.iter().for_each(|index| runs[*index].entry.folder = "/here".into());
+            let here = Here { folder: "/here".into(), terminal: Some(7) };
+            choose(runs, run_id, &here).map(|run| run.entry.run_id)
+        };
+        assert_eq!(chosen(&[1], None).unwrap(), "2-b");
+        assert_eq!(chosen(&[1], Some("3-c")).unwrap(), "3-c");
+        assert!(chosen(&[1, 2], None).unwrap_err().to_string().contains("3 runs are alive"));
+        assert!(chosen(&[], None).is_err());
     }
 
     #[test]

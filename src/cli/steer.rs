@@ -8,7 +8,7 @@ use inputs::InputFiles;
 use runtime::ctl::client;
 use runtime::ctl::protocol::{Answer, Request, State};
 use runtime::manifest::PaceSetting;
-use runtime::run_dir::{LiveRun, find_own};
+use runtime::run_dir::{LiveRun, find_own, is_own_alive};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -16,14 +16,16 @@ use std::time::Duration;
 
 /// Longest time that a swap waits for a run to be alive.
 const ALIVE: Duration = Duration::from_secs(10);
+/// The same where a run is alive that was started elsewhere, which may be the one that is meant.
+const ALIVE_BESIDE: Duration = Duration::from_secs(3);
 /// Time after which a swap says that it waits for its backup.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// The arguments of `hummingbus ctl`.
 #[derive(Args)]
 pub struct CtlArguments {
-    /// The run, as `hummingbus top` names it; needed if several are alive, or the only one was started in another folder or on
-    /// another terminal.
+    /// The run, as `hummingbus top` names it; needed if several are alive, unless just one of them was started in this folder and
+    /// on this terminal, or if the only one was started elsewhere.
     #[arg(long, global = true, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
@@ -140,8 +142,8 @@ pub struct SwapArguments {
     /// The tick from which on the backup's outputs count; as soon as possible where absent.
     #[arg(long, value_name = "TICK")]
     at_tick: Option<u32>,
-    /// The run, as `hummingbus top` names it; needed if several are alive, or the only one was started in another folder or on
-    /// another terminal.
+    /// The run, as `hummingbus top` names it; needed if several are alive, unless just one of them was started in this folder and
+    /// on this terminal, or if the only one was started elsewhere.
     #[arg(long, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
@@ -171,11 +173,16 @@ pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     show(&run, run_id, answer, arguments.json).map(|()| true)
 }
 
-/// The run that a swap asks. If no run is alive, it waits for one that is about to start.
+/// The run that a swap asks. If no run that was started here is alive, it waits for one that is about to start.
 fn awaited_run(run_id: Option<&str>) -> Result<LiveRun> {
-    if run_id.is_none() && !client::is_any_alive() {
-        output::say(&format!("no run is alive yet: the swap waits for one ({} s at most)", ALIVE.as_secs()));
-        client::await_any(ALIVE);
+    if run_id.is_none() && !is_own_alive() {
+        let (of_which, patience) =
+            if client::is_any_alive() { (" of this folder and terminal", ALIVE_BESIDE) } else { ("", ALIVE) };
+        output::say(&format!(
+            "no run{of_which} is alive yet: the swap waits for one ({} s at most)",
+            patience.as_secs()
+        ));
+        client::await_own(patience);
     }
     Ok(find_own(run_id)?)
 }

@@ -23,7 +23,7 @@ const LEAVE: Duration = Duration::from_secs(2);
 /// Arguments of `top`.
 #[derive(Args)]
 pub struct TopArguments {
-    /// The run; needed only if several are alive.
+    /// The run; needed only if several are alive, and not just one of them was started in this folder and on this terminal.
     #[arg(long, value_name = "ID")]
     run: Option<String>,
     /// Look for half a second, print what was seen, and end.

@@ -29,7 +29,7 @@ pub struct ViewArguments {
     /// The recording, and another one that is shown as a ghost beside it; none for the live run.
     #[arg(num_args = 0..=2, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
-    /// The live run; needed only if several are alive.
+    /// The live run; needed only if several are alive, and not just one of them was started in this folder and on this terminal.
     #[arg(long, value_name = "ID", conflicts_with = "recordings")]
     run: Option<String>,
     /// Port of 127.0.0.1; any free one if left out.

@@ -92,7 +92,8 @@ hummingbus run manifests/wall-follow-varying.toml --record laps.mcap --set run.d
 ];
 
 /// The pages of which no command runs here, and why.
-const LEFT_OUT: [(&str, &str); 12] = [
+const LEFT_OUT: [(&str, &str); 17] = [
+    ("docs/as-printed.md", "tests/runs/scenarios.rs flies these manifests"),
     (
         "docs/campaigns.md",
         "thousands of flights, and a cluster; tests/runs/campaign.rs and tests/runs/slurm.rs have small ones",
@@ -103,10 +104,15 @@ const LEFT_OUT: [(&str, &str); 12] = [
         "it downloads and builds a firmware; tests/runs/autopilots.rs flies with those that are there",
     ),
     (
+        "docs/flights.md",
+        "it needs data that are downloaded; identify/tests/real.rs reads those that are there",
+    ),
+    (
         "docs/real-flights.md",
         "it needs data that are downloaded; identify/tests/real.rs reads those that are there",
     ),
     ("docs/replay.md", "it downloads data; tests/runs/replay.rs flies those that are there"),
+    ("docs/rig-delay.md", "tests/runs/scenarios.rs flies these manifests"),
     (
         "docs/set-points.md",
         "a person flies in the browser; tests/runs/by_hand.rs flies, and flies again, as a client",
@@ -120,6 +126,11 @@ const LEFT_OUT: [(&str, &str); 12] = [
     ("docs/validation-simulators.md", "a minute for each of its sets, and other simulators"),
     ("docs/validation.md", "its commands compile for release, and compute for up to twenty minutes"),
     ("docs/view.md", "each command serves a browser until it is ended; tests/runs/view.rs is such a client"),
+    ("docs/walls.md", "tests/runs/scenarios.rs flies these manifests"),
+    (
+        "docs/your-drone.md",
+        "minutes of identification; tests/runs/documentation.rs flies and reads the files of the page",
+    ),
 ];
 
 /// All commands of these pages that do not run as they are written.

@@ -4,7 +4,7 @@
 use crate::ctl::protocol::{Answer, Request};
 use crate::ctl::server::{is_own_user, socket_path};
 use crate::program::WATCHDOG;
-use crate::run_dir::{LiveRun, live_runs};
+use crate::run_dir::{LiveRun, is_own_alive, live_runs};
 use anyhow::{Context, anyhow, bail};
 use bus::plan::Plan;
 use bus::user_file;
@@ -24,10 +24,10 @@ pub fn is_any_alive() -> bool {
     !live_runs().is_empty()
 }
 
-/// Waits until a run of this user is alive, at most `patience`.
-pub fn await_any(patience: Duration) {
+/// Waits until a run is alive that was started in this folder and on this terminal, at most `patience`.
+pub fn await_own(patience: Duration) {
     let start = Instant::now();
-    while !is_any_alive() && start.elapsed() < patience {
+    while !is_own_alive() && start.elapsed() < patience {
         std::thread::sleep(POLL);
     }
 }
