@@ -466,7 +466,7 @@ fn live_run(path: &Path) -> Option<LiveRun> {
     Some(LiveRun { entry, file }).filter(LiveRun::is_live)
 }
 
-/// Where a command was started: its folder, and the number of its terminal, `None` if it has none.
+/// Folder and terminal in which a command was started.
 struct Here {
     folder: PathBuf,
     terminal: Option<u32>,

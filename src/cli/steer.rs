@@ -24,8 +24,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// The arguments of `hummingbus ctl`.
 #[derive(Args)]
 pub struct CtlArguments {
-    /// The run, as `hummingbus top` names it; needed if several are alive, unless just one of them was started in this folder and
-    /// on this terminal, or if the only one was started elsewhere.
+    /// The run, as `hummingbus top` names it; needed unless just one that is alive was started in this folder and on this terminal.
     #[arg(long, global = true, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
@@ -142,8 +141,7 @@ pub struct SwapArguments {
     /// The tick from which on the backup's outputs count; as soon as possible where absent.
     #[arg(long, value_name = "TICK")]
     at_tick: Option<u32>,
-    /// The run, as `hummingbus top` names it; needed if several are alive, unless just one of them was started in this folder and
-    /// on this terminal, or if the only one was started elsewhere.
+    /// The run, as `hummingbus top` names it; needed unless just one that is alive was started in this folder and on this terminal.
     #[arg(long, value_name = "ID")]
     run: Option<String>,
     /// Print the run's answer as JSON.
