@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Longest time that a swap waits for a run to be alive.
 const ALIVE: Duration = Duration::from_secs(10);
 /// The same where a run is alive that was started elsewhere, which may be the one that is meant.
-const ALIVE_BESIDE: Duration = Duration::from_secs(3);
+const ALIVE_BESIDE: Duration = Duration::from_secs(5);
 /// Time after which a swap says that it waits for its backup.
 const SILENCE: Duration = Duration::from_secs(1);
 
