@@ -148,7 +148,7 @@ impl Table {
         if found == expected {
             return Ok(());
         }
-        let line = filled().last().map_or(self.header_line.unwrap_or(1), |row| row.line);
+        let line = filled().next_back().map_or(self.header_line.unwrap_or(1), |row| row.line);
         Err(TableError::FewRows { line, expected, found })
     }
 
