@@ -178,7 +178,7 @@ impl Executed {
                 let path = path.display();
                 let warning = format!(
                     "warning: process `{name}`: {path} is a word of its command and was written during the run. {RECORD} lists the \
-                     files of the start, so that recordings of two runs differ; pass the path of an output in `parameters` or \
+                     file of the start. If it is an output, recordings of two runs differ: pass its path in `parameters` or \
                      `environment`"
                 );
                 if !warnings.contains(&warning) {
