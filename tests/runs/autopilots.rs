@@ -4,11 +4,12 @@
 mod ardupilot;
 mod px4;
 
-use crate::recordings::require_same;
+use crate::recordings::{open, require_same};
 use crate::skipped::{cases, is_left, variable_or_skip};
 use crate::support::{Ended, Place, repository};
 use serde_json::{Value, json};
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
@@ -106,19 +107,15 @@ fn a_controller_takes_over_from_a_firmware_and_gives_back() {
     assert!(jump(&all[0]) < 1e-9 && jump(&all[1]) < 15.0, "{summary}");
 }
 
-/// Flies `manifest` with `settings`, and a second vehicle beside it with a firmware of its own.
-fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
-    let two = fs::read_to_string(manifest).unwrap();
-    let second: String = two
-        .split("[process.recorder]")
-        .next()
-        .unwrap()
-        .split("[process.plant]")
-        .nth(1)
-        .map(|rest| format!("[process.plant]{rest}"))
-        .unwrap();
+/// A manifest in `place` with two vehicles as that of `manifest`: each has a firmware of its own, and all conditions.
+fn pair(place: &Place, manifest: &str) -> String {
+    let one = fs::read_to_string(manifest).unwrap();
+    let (nodes, rest) = one.split_once("[process.recorder]").unwrap();
+    let nodes = &nodes[nodes.find("[process.plant]").unwrap()..];
+    let conditions = &rest[rest.find("[[pass]]").unwrap()..];
+    let conditions = conditions.replace("name = \"", "name = \"second vehicle: ");
     let names = ["plant", "imu", "mocap", "ekf", "controller", "sticks", "pilot"];
-    let second = names.iter().fold(second, |text, name| {
+    let second = names.iter().fold(format!("{conditions}\n{nodes}"), |text, name| {
         text.replace(&format!("[process.{name}"), &format!("[process.{name}2"))
             .replace(&format!("\"/{name}/"), &format!("\"/{name}2/"))
     });
@@ -126,24 +123,75 @@ fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
         "outputs.pose = { every_ticks = 10 }\noutputs.tf = { topic = \"/tf\", every_ticks = 10 }\n",
         "",
     );
-    let both = format!("{two}\n{second}").replace("../../", &format!("{}/", repository("")));
-    let both = place.write("two.toml", both);
-    let others =
+    place.write("two.toml", format!("{one}\n{second}").replace("../../", &repository("")))
+}
+
+/// The settings of a firmware, for both of a [`pair`].
+fn of_both(settings: &[String]) -> Vec<String> {
+    let second =
         settings.iter().map(|setting| setting.replace("process.controller.", "process.controller2."));
-    let short = "run.duration_s=3".to_owned();
-    let settings: Vec<String> = settings.iter().cloned().chain(others).chain([short]).collect();
+    settings.iter().cloned().chain(second).collect()
+}
+
+/// Altitudes at the end of the recording of a [`pair`].
+fn last_altitudes(place: &Place, recording: &str) -> [f64; 2] {
+    ["/plant/state", "/plant2/state"].map(|topic| {
+        let args = ["cat", recording, "--topic", topic, "--field", "position.z", "--csv"];
+        let rows = place.call(&args).with_code(0).output;
+        rows.lines().last().unwrap().rsplit(',').next().unwrap().parse().unwrap()
+    })
+}
+
+/// Flies `manifest` with `settings` for 3 s, and a second vehicle beside it with a firmware of its own.
+fn each_flies_its_own(place: &Place, manifest: &str, settings: &[String]) {
+    let settings = [of_both(settings), vec!["run.duration_s=3".to_owned()]].concat();
     let recording = place.path("two.mcap");
-    call(place, "run", &both, &settings, &["--record", &recording]).flown();
-    let height = |topic: &str| {
-        let out = place
-            .call(&["cat", &recording, "--topic", topic, "--field", "position.z", "--csv"])
-            .with_code(0)
-            .output;
-        out.lines().last().unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap()
-    };
+    call(place, "run", &pair(place, manifest), &settings, &["--record", &recording]).flown();
     // Their noise differs, so that no firmware has flown both.
-    let [first, second] = ["/plant/state", "/plant2/state"].map(height);
+    let [first, second] = last_altitudes(place, &recording);
     assert!((first - 1.4).abs() < 0.2 && (second - 1.4).abs() < 0.2 && first != second, "{first} {second}");
+}
+
+/// Requires that the recording of a flight of `manifest` has all bytes of `files` attached, under their names.
+fn files_are_attached(place: &Place, manifest: &str, settings: &[String], files: &[&str]) {
+    let settings = [settings, &["run.duration_s=0.1".to_owned()]].concat();
+    let recording = place.path("attached.mcap");
+    call(place, "run", manifest, &settings, &["--record", &recording]).flown();
+    let attached = open(&recording).attachments().unwrap();
+    for file in files {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        let found: Vec<String> = attached
+            .iter()
+            .filter(|(attached, _)| attached == name)
+            .map(|(_, bytes)| ::inputs::sha256(bytes))
+            .collect();
+        assert_eq!(found, [::inputs::sha256(&fs::read(file).unwrap())], "SHA-256 of {name}");
+    }
+}
+
+#[test]
+fn a_firmware_and_its_configuration_are_attached() {
+    let place = Place::new();
+    let settings = stand_in(&place, "# gains\nset p_roll = 17\n");
+    let files = ["sitl", "configuration"].map(|name| place.path(name));
+    files_are_attached(&place, &manifest(), &settings, &files.each_ref().map(String::as_str));
+}
+
+/// Raw channels, without set points: a switch arms in the run, and the throttle lifts the vehicle off.
+#[test]
+fn a_firmware_takes_off_by_the_sticks_of_a_script() {
+    let place = Place::new();
+    let manifest = repository("manifests/autopilots/betaflight-sticks.toml");
+    let flown = ["--record", &place.path("a.mcap")];
+    call(&place, "run", &manifest, &stand_in(&place, ""), &flown).with_code(0);
+    // The conditions notice a firmware that the switch does not arm.
+    let settings = [stand_in(&place, "unarmed\n"), vec!["run.duration_s=2".to_owned()]].concat();
+    let grounded = ["--record", &place.path("b.mcap"), "--json"];
+    let summary = call(&place, "run", &manifest, &settings, &grounded).with_code(1).json();
+    let verdicts = summary["pass"].as_array().unwrap();
+    let is_armed =
+        verdicts.iter().find(|it| it["name"] == "the motors idle faster once it is armed").unwrap();
+    assert_eq!(is_armed["passed"], false, "{summary}");
 }
 
 /// Runs `manifest` with `settings` for 4 s, its sticks behind a radio link that loses the part `loss`; returns the last commands.
@@ -226,12 +274,17 @@ fn a_firmware_that_fails_ends_the_run_with_its_last_words() {
         ("ends 8\n", &["betaflight ended with exit code 3", "out of coffee"]),
         ("crashes 8\n", &["betaflight was killed by signal 6"]),
         ("mute 8\n", &["it has sent no motor outputs for 0.1 s of its time"]),
-        ("hangs 8\n", &["betaflight runs and gave no answer for 0.5 s", "thinking"]),
+        ("hangs 8\n", &["betaflight runs and gave no answer for 1 s", "thinking"]),
     ];
-    for (words, told) in cases("failures", all, |(words, _)| ["ends 1\n", "mute 8\n"].contains(words)) {
+    // While it starts, without outputs, and without an answer.
+    let quick = ["ends 1\n", "mute 8\n", "hangs 8\n"];
+    for (words, told) in cases("failures", all, |(words, _)| quick.contains(words)) {
         let place = Place::new();
         let mut settings = stand_in(&place, words);
-        settings.push("process.controller.parameters.reply_timeout_s=0.5".to_owned());
+        // A short limit only where it is to pass: a loaded host answers late.
+        if words.starts_with("hangs") {
+            settings.push("process.controller.parameters.reply_timeout_s=1".to_owned());
+        }
         let recording = place.path("a.mcap");
         let ended = call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(2);
         ended.says(told);
@@ -377,7 +430,7 @@ fn betaflight_flies_the_hover_and_its_doublet() {
     };
     let place = Place::new();
     let settings = [format!("process.controller.firmware={program}")];
-    for manifest in ["betaflight", "betaflight-swap"] {
+    for manifest in ["betaflight", "betaflight-swap", "betaflight-sticks"] {
         let path = repository(&format!("manifests/autopilots/{manifest}.toml"));
         let [first, second] = ["a", "b"].map(|name| place.path(&format!("{manifest}-{name}.mcap")));
         for recording in [&first, &second] {
@@ -385,4 +438,27 @@ fn betaflight_flies_the_hover_and_its_doublet() {
         }
         require_same(&fs::read(&first).unwrap(), &second);
     }
+}
+
+/// The hover and the doublet of both, by the conditions of both.
+#[test]
+fn each_betaflight_of_a_run_flies_its_own_vehicle() {
+    let Some(program) = variable_or_skip("HUMMINGBUS_BETAFLIGHT", "the program of Betaflight's SITL") else {
+        return;
+    };
+    let place = Place::new();
+    let configuration = repository("manifests/autopilots/betaflight.cli");
+    let settings = of_both(&[
+        format!("process.controller.firmware={program}"),
+        format!("process.controller.configuration={configuration}"),
+    ]);
+    let (manifest, [first, second]) =
+        (pair(&place, &manifest()), ["a.mcap", "b.mcap"].map(|name| place.path(name)));
+    for recording in [&first, &second] {
+        call(&place, "run", &manifest, &settings, &["--record", recording]).with_code(0);
+    }
+    require_same(&fs::read(&first).unwrap(), &second);
+    // Their noise differs, so that no firmware has flown both.
+    let [one, other] = last_altitudes(&place, &first);
+    assert!(one != other, "both end at {one} m");
 }
