@@ -12,6 +12,7 @@ mod effect_files;
 mod effect_names;
 mod effect_physics;
 mod effects;
+mod failed_rotors;
 mod free_bodies;
 mod free_flight;
 mod golden;
