@@ -107,7 +107,7 @@ impl SwitchedOff<'_> {
         self.vehicle.inertia_kg_m2.try_inverse().unwrap()
     }
 
-    /// The torque of the thrust that is lost; this part of it acts.
+    /// The torque once all of its thrust is lost.
     fn tilting_N_m(&self) -> Vector3<f64> {
         self.rotor.position_m.cross(&(Vector3::z() * -self.hover_thrust_N()))
     }
@@ -184,7 +184,7 @@ fn a_rotor_that_is_switched_off_sinks_turns_and_tilts_the_hexacopter() {
             let velocity = exact.velocity_W_m_s(t);
             require_near(&format!("velocity, rotor {number}"), &body.velocity_W_m_s, &velocity, 2e-5);
         }
-        // 47 deg/s of roll or pitch at least, and 20 deg/s of yaw in the rotor's own sense.
+        // In rad/s: it tilts, and yaws in the rotor's own sense.
         let w = &state.body.angular_velocity_B_rad_s;
         assert!(w.xy().norm() > 0.8 && w.z * rotor.spin > 0.35, "{number}: {w:?}");
     }

@@ -44,6 +44,8 @@
 //! - [`readme`]: the test that README prints
 //! - [`validate`]: measured commands flown by vehicles side by side
 //! - [`scenarios`]: the thesis's scenarios and those beyond
+//! - [`multirotors`]: any number of rotors, upright and tilted
+//! - [`failing_rotors`]: rotors that fail in flight
 //! - [`scenes`]: ground, walls, rigs and other vehicles
 //! - [`judging`]: runs without a recording are judged in flight
 //! - [`view`]: recordings in the browser: address, end, refusals
@@ -72,6 +74,7 @@ mod corpus;
 mod determinism;
 mod documentation;
 mod envelope;
+mod failing_rotors;
 mod failures;
 mod file_keys;
 mod forks;
@@ -86,6 +89,7 @@ mod laps;
 mod live;
 mod loss;
 mod manifests;
+mod multirotors;
 mod new;
 mod nodes;
 mod outputs;

@@ -40,7 +40,7 @@ pub const TRUTHS: [&str; 8] = [
 
 /// Flies the manifest at `path` composed: the bytes are those of single processes (`compose`, `in_process`), and are there
 /// sooner on a machine that has other things to do.
-fn composed(place: &Place, path: &str, recording: &str, settings: &[&str]) -> Ended {
+pub fn composed(place: &Place, path: &str, recording: &str, settings: &[&str]) -> Ended {
     let mut args = vec!["run", path, "--record", recording, "--compose", "all"];
     settings.iter().for_each(|setting| args.extend(["--set", setting]));
     place.call(&args)
@@ -212,90 +212,6 @@ fn vehicles_that_lift_many_times_their_weight_hold_their_set_point() {
         );
         assert_eq!(ended.code, Some(0), "{multiple}: {ended}");
     }
-}
-
-/// The vehicle file of the hexacopter with `line` in the table of its rotor `left`.
-fn hexacopter_with(place: &Place, line: &str) -> String {
-    let text = std::fs::read_to_string(repository("vehicles/dji-f550.toml")).unwrap();
-    place.write("hexa.toml", text.replacen("name = \"left\"", &format!("name = \"left\"\n{line}"), 1))
-}
-
-#[test]
-fn a_tricopter_and_a_hexacopter_that_cannot_lose_a_rotor_are_refused_with_the_reason() {
-    let place = Place::new();
-    let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
-    let tricopter = place.write("tri.toml", &text[..text.rfind("[[rotors]]").unwrap()]);
-    let failed = hexacopter_with(&place, "failed = { value = true, source = \"test\" }");
-    let one_way = place.write("one-way.toml", text.replace("\"counter-clockwise\"", "\"clockwise\""));
-    for (vehicle, told) in [
-        (tricopter, ["yaw is not controllable", "a tricopter needs a servo"]),
-        (failed, ["its 5 working rotors of 6 cannot hover", "yaw is not controllable both ways"]),
-        (one_way, ["one-way.toml:", "all rotors turn one way, so that yaw follows from thrust"]),
-    ] {
-        let set = format!("process.controller.vehicle={vehicle}");
-        let check = ["check", &repository("manifests/hexa-hover.toml"), "--set", &set];
-        place.call(&check).with_code(2).says(&told);
-    }
-}
-
-/// Rotors that are all in front, two of them in one place.
-#[test]
-fn rotors_that_leave_a_torque_in_hover_are_refused_with_all_that_is_odd() {
-    let place = Place::new();
-    let text = std::fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
-    let text = ["[0.17, 0, 0]", "[0, -0.17, 0]", "[-0.17, 0, 0]", "[0, 0.17, 0]"]
-        .into_iter()
-        .zip(["[0.4, 0, 0]", "[0.2, -0.17, 0]", "[0.4, 0, 0]", "[0.2, 0.17, 0]"])
-        .fold(text, |text, (from, to)| {
-            text.replacen(&format!("value = {from}"), &format!("value = {to}"), 1)
-        });
-    let (head, rotors) = text.split_once("[[rotors]]").unwrap();
-    let (front, others) = rotors.split_at(rotors.find("[[rotors]]").unwrap());
-    let vehicle = format!("{head}[[rotors]]{}{others}", front.replace("\"clockwise", "\"counter-clockwise"));
-    let vehicle = place.write("ahead.toml", vehicle);
-    let sets = ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
-    let check = ["check", &repository("manifests/hover.toml"), "--set", &sets[0], "--set", &sets[1]];
-    let ended = place.call(&check).with_code(2);
-    ended.says(&[
-        "its 4 working rotors of 4 cannot hover",
-        "a pitch torque remains unbalanced",
-        "ahead.toml:",
-    ]);
-    ended.says(&["warning: ", "its rotors \"front\" and \"rear\" in one place"]);
-}
-
-/// With neighbours that turn alike the others take over, and it flies on.
-#[test]
-fn a_hexacopter_whose_spins_allow_it_flies_on_without_a_rotor() {
-    let place = Place::new();
-    let vehicle = hexacopter_with(&place, "failed = { value = true, source = \"test\" }");
-    // From the left rotor on, counter-clockwise seen from above: P P N N P N with the failed one first.
-    let text = std::fs::read_to_string(&vehicle).unwrap();
-    let mut document: toml_edit::DocumentMut = text.parse().unwrap();
-    let spins = [
-        ("left", "counter-clockwise"),
-        ("rear left", "counter-clockwise"),
-        ("rear right", "clockwise"),
-        ("right", "clockwise"),
-        ("front right", "counter-clockwise"),
-        ("front left", "clockwise"),
-    ];
-    for rotor in document["rotors"].as_array_of_tables_mut().unwrap().iter_mut() {
-        let name = rotor["name"].as_str().unwrap().to_owned();
-        rotor["spin"]["value"] = toml_edit::value(spins.iter().find(|spin| spin.0 == name).unwrap().1);
-    }
-    std::fs::write(&vehicle, document.to_string()).unwrap();
-    let recording = place.path("flight.mcap");
-    let [plant, controller] =
-        ["plant", "controller"].map(|process| format!("process.{process}.vehicle={vehicle}"));
-    let manifest = repository("manifests/hexa-hover.toml");
-    composed(&place, &manifest, &recording, &[&plant, &controller]).flown();
-    let states = rows(&recording, "/plant/state");
-    assert!(states.iter().all(|state| state.get("rotor_speed[1]") == 0.0));
-    let last = states.last().unwrap();
-    assert!((last.get("position.z") - 1.5).abs() < 0.05, "{last:?}");
-    let tilt = |state: &crate::recordings::Row| libm::hypot(state.get("attitude.x"), state.get("attitude.y"));
-    assert!(tilt(last) < 0.01 && last.get("attitude.z").abs() < 0.05, "{last:?}");
 }
 
 /// Not for the two laps that the manifest asks for, which take a minute: for half a lap, and no contact.
