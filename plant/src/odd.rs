@@ -177,42 +177,69 @@ mod tests {
         }
     }
 
+    /// Of four rotors and of six.
     #[test]
     fn what_is_odd_is_told_with_its_line() {
         type Change = fn(&mut Vehicle);
         let cases: [(Change, &[&str]); 8] = [
             (
-                |it| it.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 88.0 / 0.17),
-                &["arms of 88 m", "`rotors.0.position`"],
+                |it| {
+                    let arm_m = it.rotors[0].position_m.norm();
+                    it.rotors.iter_mut().for_each(|rotor| rotor.position_m *= 88.0 / arm_m);
+                },
+                &["arms of 88 m", ".position`"],
             ),
             (
                 |it| it.rotors[2].position_m = it.rotors[0].position_m,
-                &["\"front\" and \"rear\" in one place", "`rotors.2.position`"],
+                &["in one place", "`rotors.0.position`", "`rotors.2.position`"],
             ),
             (|it| it.rotors.iter_mut().for_each(|rotor| rotor.spin = 1.0), &["all turn one way"]),
             (
-                |it| it.inertia_kg_m2 *= 2.0 / 0.0056,
-                &["inertia of 2.0000e0 kg*m^2 at 0.4800 kg", "`body.inertia_xx`"],
+                |it| {
+                    let about_x_kg_m2 = it.inertia_kg_m2[(0, 0)];
+                    it.inertia_kg_m2 *= 2.0 / about_x_kg_m2;
+                    it.mass_kg = 0.5;
+                },
+                &["inertia of 2.0000e0 kg*m^2 at 0.5000 kg", "`body.inertia_xx`", "`body.mass`"],
             ),
-            (|it| it.rotors[1].axis = Vector3::x(), &["\"right\" whose axis is 90.0 degrees from body z"]),
-            (|it| it.inertia_kg_m2 *= 1e-4, &["inertia of 5.6000e-7 kg*m^2"]),
+            (|it| it.rotors[1].axis = Vector3::x(), &["whose axis is 90.0 degrees from body z"]),
+            (|it| it.inertia_kg_m2 *= 1e-4, &["has a moment of inertia of", "`body.inertia_xx`"]),
             (
                 |it| it.motor = MotorModel::FirstOrder { time_constant_s: 25.0 },
                 &["motors that take 25.0000 s"],
             ),
             (
                 |it| it.motor = MotorModel::SecondOrder { natural_frequency_rad_s: 0.04, damping_ratio: 1.0 },
-                &["motors that take 25.0000 s", "`motor.natural_frequency`"],
+                &["motors that take 25.0000 s"],
             ),
         ];
-        for (change, expected) in cases {
-            let mut vehicle = load("hummingbird.toml");
+        for (file, (change, expected)) in
+            ["hummingbird.toml", "dji-f550.toml"].into_iter().flat_map(|file| cases.map(|case| (file, case)))
+        {
+            let mut vehicle = load(file);
             change(&mut vehicle);
             let messages = told(&vehicle);
             let of = messages.iter().find(|message| message.contains(expected[0]));
-            let message = of.unwrap_or_else(|| panic!("{expected:?} in {messages:?}"));
-            assert!(expected.iter().all(|word| message.contains(word)), "{message}");
+            let message = of.unwrap_or_else(|| panic!("{file}: {expected:?} in {messages:?}"));
+            assert!(expected.iter().all(|word| message.contains(word)), "{file}: {message}");
         }
+    }
+
+    #[test]
+    fn odd_rotors_and_motors_are_told_by_name_and_key() {
+        let told_of = |change: fn(&mut Vehicle)| {
+            let mut vehicle = load("hummingbird.toml");
+            change(&mut vehicle);
+            told(&vehicle).concat()
+        };
+        let said = told_of(|it| it.rotors[2].position_m = it.rotors[0].position_m);
+        assert!(said.contains("\"front\" and \"rear\" in one place"), "{said}");
+        let said = told_of(|it| it.rotors[1].axis = Vector3::x());
+        assert!(said.contains("\"right\" whose axis"), "{said}");
+        let said = told_of(|it| {
+            it.motor = MotorModel::SecondOrder { natural_frequency_rad_s: 0.04, damping_ratio: 1.0 };
+        });
+        assert!(said.contains("`motor.natural_frequency`"), "{said}");
     }
 
     #[test]
