@@ -5,7 +5,7 @@ use identify::report::Report;
 use identify::run::identify;
 use simulated::cases::Case;
 
-/// What flights of 10 s show if the rotor `weak` of the vehicle lacks a part of its thrust.
+/// The report on flights of 10 s in which the rotor `weak` lacks a part of its thrust.
 fn report_of(vehicle: &'static str, seed: u64, weak: &str, loss: f64) -> Report {
     let mut case = Case::null(seed, 10.0);
     case.vehicle = vehicle;

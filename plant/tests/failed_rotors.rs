@@ -112,8 +112,8 @@ impl SwitchedOff<'_> {
         self.rotor.position_m.cross(&(Vector3::z() * -self.hover_thrust_N()))
     }
 
-    /// The angular velocity without coupling of the axes. About z the drag torque is lost that balanced the other rotors', and
-    /// the rotor hands its own momentum over as it stops: both turn the body in the sense of the rotor.
+    /// The angular velocity without coupling of the axes. About z, the drag torque of the rotor no longer balances that of the
+    /// others, and the rotor hands its momentum over as it stops. Both turn the body in the sense of the rotor.
     fn uncoupled_B_rad_s(&self, t: f64) -> Vector3<f64> {
         let hover_rad_s = self.vehicle.hover_speed_rad_s();
         let drag_N_m = self.vehicle.torque_coefficient * hover_rad_s.powi(2);

@@ -39,7 +39,7 @@ fn on_the_f550(place: &Place, name: &str, body: &str, rotors: &[String]) -> Stri
     )
 }
 
-/// The F550 with rotors that lean by `lean_deg` about their arms, each in its own sense of rotation: the thrust then turns the
+/// The F550 with rotors that lean by `lean_deg` about their arms, each in its own sense of rotation. The thrust then turns the
 /// vehicle in the sense of the rotor, and the drag against it.
 fn leaning(place: &Place, name: &str, lean_deg: f64) -> String {
     let (sine, cosine) = libm::sincos(lean_deg.to_radians());
@@ -145,10 +145,10 @@ fn lift(vehicle: &Vehicle, state: &Row) -> f64 {
     vehicle.thrust_coefficient * squares.sum::<f64>()
 }
 
-/// Of a rotor that leans by 30° about its arm the thrust has the lever of 0.27 m sin 30° = 0.135 m about z, and the drag against it
-/// that of 0.07 m cos 30° = 0.061 m. An allocation that ignored the tilt would count on the drag alone: its yaw torque would have the
-/// wrong sign, and the yaw would run away. It would also have a seventh less thrust than it counts on. The second flight shows
-/// it: there the controller has the vehicle file with upright rotors.
+/// The rotors lean by 30° about their arms. About z, the lever of the thrust is 0.27 m sin 30° = 0.135 m. The drag, against it, is as
+/// much thrust at 0.07 m cos 30° = 0.061 m. An allocation that ignored the tilt would know the drag alone. Its yaw torque would
+/// have the wrong sign, and the yaw would run away. The rotors would also lift a seventh less than it counts on. The second flight
+/// shows this: there the controller has the vehicle file with upright rotors.
 #[test]
 fn a_hexacopter_with_tilted_rotors_flies_about_all_axes_if_its_controller_knows_the_tilt() {
     let place = Place::new();
@@ -239,8 +239,8 @@ fn rotors_that_leave_a_torque_in_hover_are_refused_with_all_that_is_odd() {
     ended.says(&["warning: ", "its rotors \"front\" and \"rear\" in one place"]);
 }
 
-/// The hexacopter whose neighbours turn alike in two pairs, with `line` in the table of its rotor `left`: from that rotor on,
-/// counter-clockwise seen from above, P P N N P N. It flies on without one of the first four.
+/// The hexacopter whose neighbours turn alike in two pairs, with `line` in the table of its rotor `left`. From that rotor on,
+/// counter-clockwise seen from above, it has P P N N P N, and flies on without one of the first four.
 pub fn hexacopter_of_pairs(place: &Place, line: &str) -> String {
     let vehicle = hexacopter_with(place, line);
     let text = std::fs::read_to_string(&vehicle).unwrap();
