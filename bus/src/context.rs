@@ -1,6 +1,7 @@
 //! Information for a component: about its run when it is made, and about the tick when it steps.
 
-use crate::ports::{InputSamples, OutputPorts, SampleSource};
+use crate::ports::{InputSamples, OutputNumber, OutputPorts, SampleSource};
+use crate::sample_ticks::SampleTicks;
 use inputs::InputFiles;
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -246,6 +247,8 @@ impl<'a> NodeContext<'a> {
 pub struct StepContext<'a> {
     pub(crate) tick: u32,
     pub(crate) time_ns: u64,
+    /// Ticks whose steps write a sample, by output; `None` for outputs that are not wired.
+    pub(crate) sends: &'a [Option<SampleTicks>],
     /// Last samples of the predecessor, by output.
     pub(crate) predecessor: Option<&'a dyn SampleSource>,
     /// Value of the program that steps the simulation.
@@ -278,6 +281,19 @@ impl StepContext<'_> {
     #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time_ns as f64 * 1e-9
+    }
+
+    /// True if this step has to write `output`: a sample of it is sent at this tick. An output that is not wired is never due.
+    /// A component may leave out the work for an output that is not due, unless its state depends on this work.
+    ///
+    /// A node whose steps take simulated time (`computing_time`) sends a sample when the step is done. All its wired outputs
+    /// are due at each step.
+    ///
+    /// [`Harness::sending`](crate::Harness::sending) has an example.
+    #[must_use]
+    pub fn is_due(&self, output: OutputNumber) -> bool {
+        let ticks = self.sends.get(output.0).copied().flatten();
+        ticks.is_some_and(|ticks| ticks.is_due(self.tick))
     }
 
     /// Last outputs of the process that this one replaces: the command to go on from without a jump. They are present

@@ -3,6 +3,7 @@
 use crate::error::BusError;
 use crate::initial;
 use crate::plan::InputPlan;
+use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
 use std::marker::PhantomData;
 
@@ -82,4 +83,6 @@ impl Declared {
 pub(crate) struct Wiring {
     pub(crate) inputs: Vec<Option<usize>>,
     pub(crate) outputs: Vec<Option<usize>>,
+    /// Ticks whose steps write a sample, by output; `None` for outputs that are not wired.
+    pub(crate) sends: Vec<Option<SampleTicks>>,
 }

@@ -2,9 +2,10 @@
 
 use crate::component::{Component, State, StepError};
 use crate::context::{NodeContext, StepContext};
-use crate::ports::SampleSource;
+use crate::ports::{OutputNumber, OutputPorts, SampleSource};
 use crate::registration::make_of;
 use crate::sample_memory::SampleMemory;
+use crate::sample_ticks::SampleTicks;
 use diagnostics::ParameterError;
 
 /// A component with its state and its time, stepped by hand.
@@ -19,6 +20,8 @@ pub struct Harness<C: Component> {
     pub tick: u32,
     tick_ns: u64,
     period_ticks: u32,
+    /// Ticks of the samples, by output; `None` for outputs that are not wired.
+    sends: Vec<Option<SampleTicks>>,
     /// Last samples of a predecessor, until the next step.
     predecessor: Option<SampleMemory>,
 }
@@ -48,7 +51,62 @@ impl<C: Component> Harness<C> {
         let component: C = make_of(parameters, context)?;
         let state = component.initial();
         let (tick_ns, period_ticks) = (context.tick_ns, context.period_ticks);
-        Ok(Self { component, state, tick: 0, tick_ns, period_ticks, predecessor: None })
+        let sends = vec![Some(SampleTicks::every(1)); <C::Outputs as OutputPorts>::DECLARED.len()];
+        Ok(Self { component, state, tick: 0, tick_ns, period_ticks, sends, predecessor: None })
+    }
+
+    /// The same component whose output `port` is sent at `ticks`, or is not wired if that is `None`. Without this, all
+    /// outputs are due at each step.
+    ///
+    /// ```
+    /// use bus::component::{Component, Info, StepError};
+    /// use bus::context::{NodeContext, StepContext};
+    /// use bus::messages::{PlannedPath, SetPoint};
+    /// use bus::ports::OutputNumber;
+    /// use bus::sample_ticks::SampleTicks;
+    ///
+    /// /// Asks for a hover, and sends its way there.
+    /// struct Planner;
+    ///
+    /// #[derive(bus::OutputPorts)]
+    /// struct Outputs {
+    ///     set_point: SetPoint,
+    ///     path: Option<PlannedPath>,
+    /// }
+    ///
+    /// const PATH: OutputNumber = OutputNumber::of::<Outputs>("path");
+    ///
+    /// impl Component for Planner {
+    ///     const INFO: Info = Info::new("planner", "plans a way");
+    ///     type Parameters = std::collections::BTreeMap<String, f64>;
+    ///     type Inputs<'a> = ();
+    ///     type Outputs = Outputs;
+    ///     type State = ();
+    ///
+    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
+    ///         Ok(Self)
+    ///     }
+    ///
+    ///     fn initial(&self) {}
+    ///
+    ///     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+    ///         let path = context.is_due(PATH).then(|| PlannedPath::new([]));
+    ///         Ok(Outputs { set_point: SetPoint::default(), path })
+    ///     }
+    /// }
+    ///
+    /// let planner = bus::Harness::<Planner>::from_json(&serde_json::json!({})).unwrap();
+    /// let mut planner = planner.sending("path", Some(SampleTicks::every(3)));
+    /// let planned: Vec<u32> = (0..8).filter(|_| planner.step(()).unwrap().path.is_some()).collect();
+    /// assert_eq!(planned, [0, 3, 6]);
+    /// ```
+    ///
+    /// # Panics
+    /// If the component has no such output.
+    #[must_use]
+    pub fn sending(mut self, port: &str, ticks: Option<SampleTicks>) -> Self {
+        self.sends[OutputNumber::of::<C::Outputs>(port).0] = ticks;
+        self
     }
 
     /// The component.
@@ -71,6 +129,7 @@ impl<C: Component> Harness<C> {
         let context = StepContext {
             tick: self.tick,
             time_ns: u64::from(self.tick) * self.tick_ns,
+            sends: &self.sends,
             predecessor: predecessor.as_ref().map(|sent| sent as &dyn SampleSource),
             given: None,
         };

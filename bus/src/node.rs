@@ -16,12 +16,13 @@ use crate::membership::Membership;
 use crate::message::Message;
 use crate::names::process_name;
 use crate::place::Place;
-use crate::plan::{NodePlan, Pace, Plan};
+use crate::plan::{NodePlan, OutputPlan, Pace, Plan};
 use crate::port::OutPort;
 use crate::ports::{Inputs, PortSpec};
 use crate::registration::{Registration, message_of};
 use crate::remark;
 use crate::sample_ring::SampleRing;
+use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
 use crate::tick::Tick;
 use crate::transport::Transport;
@@ -181,7 +182,19 @@ impl Node {
             }),
             Inputs::Forwarded { .. } => Vec::new(),
         };
-        Ok(Wiring { inputs, outputs: self.declare_outputs(component)? })
+        let outputs = self.declare_outputs(component)?;
+        Ok(self.wiring(inputs, outputs))
+    }
+
+    /// Wiring of the component's ports, whose indices among those of the node are `inputs` and `outputs`.
+    fn wiring(&self, inputs: Vec<Option<usize>>, outputs: Vec<Option<usize>>) -> Wiring {
+        // As `OutPort::takes`: a step that takes time is sent at a tick that is not known yet.
+        let is_timed = self.node.computing_time.is_some();
+        let ticks = |output: &OutputPlan| {
+            if is_timed { SampleTicks::every(1) } else { self.plan.topics[output.topic].ticks }
+        };
+        let sends = outputs.iter().map(|index| index.map(|index| ticks(&self.node.outputs[index]))).collect();
+        Wiring { inputs, outputs, sends }
     }
 
     fn declare_outputs(&mut self, component: &Registration) -> Result<Vec<Option<usize>>, BusError> {
@@ -211,7 +224,7 @@ impl Node {
             inputs.push(Some(index));
             outputs.push(Some(self.declare_output(&input.port, schema, true)?));
         }
-        Ok(Wiring { inputs, outputs })
+        Ok(self.wiring(inputs, outputs))
     }
 
     fn declare_port(&mut self, port: &PortSpec) -> Result<Option<usize>, BusError> {

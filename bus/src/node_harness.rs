@@ -24,6 +24,8 @@ pub struct NodeHarness {
     tick_ns: u64,
     inputs: Vec<Option<InputWire>>,
     outputs: Vec<OutputWire>,
+    /// Ticks of the samples, by output; `None` for outputs that are not wired.
+    sends: Vec<Option<SampleTicks>>,
 }
 
 /// A wired input.
@@ -68,6 +70,7 @@ impl NodeHarness {
         let forwarded = forwarded(component, components, plan, node)?;
         let declared = component.outputs.iter().map(|port| wire(port.name, port.schema, false));
         let outputs = declared.chain(forwarded.iter().map(|(name, schema)| wire(name, schema, true)));
+        let outputs: Vec<OutputWire> = outputs.collect();
         if !forwarded.is_empty() {
             connect(&mut *made, &forwarded)?;
         }
@@ -75,7 +78,8 @@ impl NodeHarness {
             instance: made,
             tick_ns: plan.tick_ns,
             inputs: inputs(component, node, &forwarded)?,
-            outputs: outputs.collect(),
+            sends: outputs.iter().map(|wire| wire.topic.map(|(_, ticks)| ticks)).collect(),
+            outputs,
         })
     }
 
@@ -114,7 +118,7 @@ impl NodeHarness {
         let given = SampleMemory::given(self.inputs.iter().map(given).collect());
         let mut sent = SampleMemory::empty(self.outputs.iter().map(|wire| wire.schema));
         let time_ns = u64::from(tick) * self.tick_ns;
-        let context = StepContext { tick, time_ns, predecessor: None, given: None };
+        let context = StepContext { tick, time_ns, sends: &self.sends, predecessor: None, given: None };
         self.instance.step(&context, InputSamples(&given), &mut OutputSamples(&mut sent))?;
         let due = self.outputs.iter().zip(sent.samples).filter_map(|(wire, words)| {
             let (topic, ticks) = wire.topic?;

@@ -31,6 +31,55 @@ pub struct PortSpec {
     pub required: bool,
 }
 
+/// Number of an output among those that a component declares. A step asks with it whether the output is due
+/// ([`StepContext::is_due`](crate::context::StepContext::is_due)).
+///
+/// In a constant, a name that is not declared is an error of the compiler:
+///
+/// ```
+/// use bus::messages::{PlannedPath, Reference};
+/// use bus::ports::OutputNumber;
+///
+/// #[derive(bus::OutputPorts)]
+/// struct Outputs {
+///     reference: Reference,
+///     path: Option<PlannedPath>,
+/// }
+/// const PATH: OutputNumber = OutputNumber::of::<Outputs>("path");
+/// assert_ne!(PATH, OutputNumber::of::<Outputs>("reference"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutputNumber(pub(crate) usize);
+
+impl OutputNumber {
+    /// Number of the output called `name` among the outputs `O`.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    #[must_use]
+    pub const fn of<O: OutputPorts>(name: &str) -> Self {
+        let ports = O::DECLARED;
+        let mut number = 0;
+        while number < ports.len() {
+            if is_same(ports[number].name, name) {
+                return Self(number);
+            }
+            number += 1;
+        }
+        panic!("the component declares no output of this name")
+    }
+}
+
+/// True if two names are equal; `==` is not for constants.
+const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
+    let mut index = 0;
+    while index < one.len() && index < other.len() && one[index] == other[index] {
+        index += 1;
+    }
+    index == one.len() && index == other.len()
+}
+
 /// Inputs of a component.
 #[derive(Clone, Copy, Debug)]
 pub enum Inputs {
@@ -366,3 +415,29 @@ impl<'a> InputPorts<'a> for ForwardedInputs<'a> {
 
 /// Bytes that a forwarded message has at most.
 pub const FORWARDED_BYTES_MAX: usize = 256;
+
+#[cfg(test)]
+mod tests {
+    use super::OutputNumber;
+    use crate::messages::{PlannedPath, Reference};
+
+    #[derive(crate::OutputPorts)]
+    struct Outputs {
+        path_reference: Reference,
+        path: Option<PlannedPath>,
+        pat: Option<PlannedPath>,
+    }
+
+    #[test]
+    fn a_name_finds_its_output_and_not_one_that_begins_alike() {
+        for (number, name) in ["path_reference", "path", "pat"].into_iter().enumerate() {
+            assert_eq!(OutputNumber::of::<Outputs>(name), OutputNumber(number), "{name}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "declares no output")]
+    fn a_name_that_is_not_declared_is_refused() {
+        let _ = OutputNumber::of::<Outputs>("paths");
+    }
+}

@@ -200,6 +200,7 @@ impl Computation for Wired<'_> {
         let context = StepContext {
             tick: number,
             time_ns: tick.time_ns,
+            sends: &wiring.sends,
             predecessor: (!tick.predecessor.is_empty()).then_some(&predecessor as &dyn SampleSource),
             given: self.given,
         };

@@ -5,6 +5,7 @@ use bus::OutputPorts;
 use bus::component::{Component, Info, StepError};
 use bus::context::{NodeContext, StepContext};
 use bus::messages::{Orientation, PlannedPath, Pose, Reference, Time};
+use bus::ports::OutputNumber;
 use diagnostics::ParameterError;
 
 /// Parameters of the trajectory.
@@ -41,6 +42,9 @@ pub struct Outputs {
     pub path: Option<PlannedPath>,
 }
 
+/// The output `path`, which takes as long as 100 references.
+const PATH: OutputNumber = OutputNumber::of::<Outputs>("path");
+
 /// Time between two poses of the path.
 const POSE_EVERY_NS: u64 = 100_000_000;
 
@@ -59,8 +63,6 @@ const POSE_EVERY_NS: u64 = 100_000_000;
 #[derive(Debug)]
 pub struct TrajectoryNode {
     trajectory: Trajectory,
-    /// True if the manifest names the output `path`, which takes as long as 100 references.
-    has_path: bool,
 }
 
 impl TrajectoryNode {
@@ -101,7 +103,7 @@ impl Component for TrajectoryNode {
         let trajectory = Trajectory::read(&parameters.segments, start)?;
         trajectory.require_flyable()?;
         warn_of_late(&trajectory, context);
-        Ok(Self { trajectory, has_path: context.has("path") })
+        Ok(Self { trajectory })
     }
 
     fn initial(&self) {}
@@ -109,7 +111,7 @@ impl Component for TrajectoryNode {
     fn step(&self, context: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
         let now_ns = context.time_ns();
         let reference = Reference::from(&self.at(now_ns));
-        if !self.has_path {
+        if !context.is_due(PATH) {
             // Written apart: of an `Option` that is made first, all 7.2 kB would be copied into the outputs.
             return Ok(Outputs { reference, path: None });
         }
@@ -121,6 +123,7 @@ impl Component for TrajectoryNode {
 mod tests {
     use super::*;
     use bus::Harness;
+    use bus::sample_ticks::SampleTicks;
     use serde_json::json;
 
     #[test]
@@ -130,8 +133,7 @@ mod tests {
         });
         let parameters =
             Parameters { initial_position_m: [0.0, 0.0, 1.0], initial_yaw_deg: 0.0, segments: vec![circle] };
-        let context = NodeContext::new("trajectory", &[]).naming(&["path"]);
-        let mut node = Harness::<TrajectoryNode>::in_context(parameters, &context).unwrap();
+        let mut node = Harness::<TrajectoryNode>::new(parameters).unwrap();
         let path = node.step(()).unwrap().path.unwrap();
         assert_eq!(path.poses().count(), PlannedPath::POSES_MAX);
         let (stamp, pose) = path.poses().nth(30).unwrap();
@@ -144,10 +146,32 @@ mod tests {
         assert!((2.0 * libm::atan2(turn.z, turn.w) - later.yaw).abs() < 1e-12, "{later:?}");
     }
 
+    fn hover() -> Harness<TrajectoryNode> {
+        Harness::from_json(&json!({ "initial_position_m": [0.0, 0.0, 1.0] })).unwrap()
+    }
+
+    #[test]
+    fn a_path_is_computed_at_the_ticks_at_which_it_is_sent_and_begins_there() {
+        // Evenly, and at the uneven ticks of 30 Hz.
+        for ticks in [SampleTicks::every(100), SampleTicks::measured(1, 1_000_000, 33_333_333, 5_000_000)] {
+            let mut node = hover().sending("path", Some(ticks));
+            let mut computed = 0;
+            for tick in 0..1000 {
+                let path = node.step(()).unwrap().path;
+                assert_eq!(path.is_some(), ticks.is_due(tick), "tick {tick} of {ticks:?}");
+                let first = path.and_then(|path| path.poses().next());
+                let begins_now =
+                    first.is_none_or(|(stamp, _)| stamp == Time::from_ns(u64::from(tick) * 1_000_000));
+                assert!(begins_now, "the path of tick {tick} begins at {first:?}");
+                computed += u32::from(path.is_some());
+            }
+            assert!((10..=31).contains(&computed), "{computed} of {ticks:?}");
+        }
+    }
+
     #[test]
     fn no_path_is_computed_that_the_manifest_does_not_name() {
-        let mut node =
-            Harness::<TrajectoryNode>::from_json(&json!({ "initial_position_m": [0.0, 0.0, 1.0] })).unwrap();
-        assert!(node.step(()).unwrap().path.is_none());
+        let mut node = hover().sending("path", None);
+        assert!((0..200).all(|_| node.step(()).unwrap().path.is_none()));
     }
 }
