@@ -108,8 +108,9 @@ impl Component for Plant {
         if let Some(trouble) = memory.backend.trouble() {
             return Err(trouble.into());
         }
-        let actuators = actuators(self.origin.model.airframe().declared_command(), &inputs.command.command);
-        let outputs = Outputs::of(&*memory.backend, &self.frame, actuators, context.time_ns());
+        let map = self.origin.model.airframe().declared_command();
+        let actuators = || actuators(map, &inputs.command.command);
+        let outputs = Outputs::of(&*memory.backend, &self.frame, actuators, context);
         set_body(memory, measured);
         Ok(outputs)
     }

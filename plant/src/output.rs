@@ -3,10 +3,12 @@
 use crate::backend::Backend;
 use crate::state::RigidBody;
 use bus::OutputPorts;
+use bus::context::StepContext;
 use bus::messages::{
     Actuators, Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState,
     Point, Pose, PoseStamped, Quaternion,
 };
+use bus::ports::OutputNumber;
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::CommandMap;
 
@@ -31,21 +33,31 @@ pub struct Outputs {
     pub battery: Option<Battery>,
 }
 
+const ODOMETRY: OutputNumber = OutputNumber::of::<Outputs>("odometry");
+const ACTUATORS: OutputNumber = OutputNumber::of::<Outputs>("actuators");
+const BODIES: OutputNumber = OutputNumber::of::<Outputs>("bodies");
+
 impl Outputs {
-    /// The motion of `backend`, at `time_ns`, of a body with this frame; `actuators` are the commands that it has.
-    pub(crate) fn of(backend: &dyn Backend, frame: &FrameName, actuators: Actuators, time_ns: u64) -> Self {
+    /// The motion of `backend`, at the tick of `context`, of a body with this frame; `actuators` returns the commands that it
+    /// has. Large messages are made only if they are sent.
+    pub(crate) fn of(
+        backend: &dyn Backend,
+        frame: &FrameName,
+        actuators: impl FnOnce() -> Actuators,
+        context: &StepContext<'_>,
+    ) -> Self {
         let body = &backend.state().body;
         let (position, orientation) = (point(&body.position_W_m), orientation(&body.attitude_WB));
         Self {
             state: state(backend),
             pose: Some(PoseStamped { pose: Pose { position, orientation }, ..Default::default() }),
             tf: Some(BodyTransform::new(frame, position, orientation)),
-            odometry: Some(odometry(body, frame)),
-            actuators: Some(actuators),
+            odometry: context.is_due(ODOMETRY).then(|| odometry(body, frame)),
+            actuators: context.is_due(ACTUATORS).then(actuators),
             contact: Some(contact(backend)),
-            // Without free bodies the port cannot be wired.
-            bodies: (!backend.bodies().is_empty()).then(|| bodies(backend)),
-            battery: Some(battery_message(backend, time_ns)),
+            // Without free bodies the port cannot be wired, and is never due.
+            bodies: context.is_due(BODIES).then(|| bodies(backend)),
+            battery: Some(battery_message(backend, context.time_ns())),
         }
     }
 }
