@@ -89,6 +89,24 @@ async function zoom(page) {
   return zoomed;
 }
 
+/** Zooms with keys alone, at 1 s of the recording: the windows in seconds. */
+async function zoomKeys(page) {
+  const shown = () => page.evaluate(() => window.hummingbus.scopes.window);
+  await page.evaluate(() => {
+    document.activeElement?.blur();
+    window.hummingbus.playback.seek(1e9);
+  });
+  const windows = [];
+  for (const key of ["z", "z", "Z", "w", "z", "Z"]) {
+    if (key === "Z") await page.keyboard.down("Shift");
+    await page.keyboard.press(key);
+    if (key === "Z") await page.keyboard.up("Shift");
+    windows.push(await shown());
+  }
+  await page.keyboard.press("Home");
+  return windows;
+}
+
 /** Adds a plot of a field that is searched for, with the keyboard alone. */
 async function pick(page, words) {
   const count = await page.evaluate(() => window.hummingbus.scopes.plots.length);
@@ -129,9 +147,22 @@ async function live(page) {
     return shown.timeNs >= from + 2e9 && playback.durationNs - shown.timeNs < 4e9;
   }, {}, first.timeNs);
   const later = await look();
+  // Space holds the page alone: its curves end where they ended, while the run and its recording go on.
+  const ends = () => page.evaluate(() => {
+    const { playback, scopes } = window.hummingbus;
+    return { isPlaying: playback.isPlaying, endS: scopes.endS, durationNs: playback.durationNs };
+  });
+  await page.evaluate(() => document.activeElement?.blur());
+  await page.keyboard.press("Space");
+  await page.waitForFunction(() => !window.hummingbus.playback.isPlaying && !window.hummingbus.scopes.newest);
+  const held = await ends();
+  await page.waitForFunction((from) => window.hummingbus.playback.durationNs > from + 1e9, {}, held.durationNs);
+  const stillHeld = await ends();
+  await page.keyboard.press("Space");
+  await page.waitForFunction((from) => window.hummingbus.scopes.endS > from, {}, held.endS);
   process.kill(run);
   await page.waitForFunction(() => !window.hummingbus.playback.isGrowing && document.querySelector("#state").textContent === "");
-  return { first, later, last: await look() };
+  return { first, later, held, stillHeld, last: await look() };
 }
 
 /** Waits for a vehicle that comes late; names of those that are shown then. */
@@ -219,7 +250,7 @@ const seen = await withPage(address, async (page, wrong) => {
     values: await page.evaluate(() => [...document.querySelectorAll(".plot-head .value")].map((value) => value.textContent)),
   };
   if (screenshot) await page.screenshot({ path: screenshot });
-  Object.assign(found, { keys: await keys(page), zoomed: await zoom(page), picked: await pick(page, "plant/state position.z") });
+  Object.assign(found, { keys: await keys(page), zoomed: await zoom(page), zoomedByKeys: await zoomKeys(page), picked: await pick(page, "plant/state position.z") });
   found.wrong = [...wrong, ...said];
   return server ? { ...found, lost: await lose(page) } : found;
 }, options);

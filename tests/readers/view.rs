@@ -98,7 +98,24 @@ fn a_browser_shows_the_poses_and_curves_of_a_flight_on_every_screen() {
         // A quarter to a half of two seconds.
         let zoomed: [f64; 2] = serde_json::from_value(seen["zoomed"].clone()).unwrap();
         assert!((zoomed[0] - 0.5).abs() < 0.06 && (zoomed[1] - 1.0).abs() < 0.06, "{zoomed:?}");
+        require_zoom_by_keys(&seen);
         assert_eq!(seen["picked"], json!([[0, "/plant/state", "position.z"]]));
+    }
+}
+
+/// Z halves the window around 1 s of the flight of 2 s, shift and Z doubles it, W shows all.
+fn require_zoom_by_keys(seen: &Value) {
+    let windows: Vec<Option<[f64; 2]>> = serde_json::from_value(seen["zoomedByKeys"].clone()).unwrap();
+    let expected = [Some([0.5, 1.5]), Some([0.75, 1.25]), Some([0.5, 1.5]), None, Some([0.5, 1.5]), None];
+    assert_eq!(windows.len(), expected.len());
+    for (index, (found, expected)) in windows.iter().zip(expected).enumerate() {
+        let is_near = match (found, expected) {
+            (Some(found), Some(expected)) => {
+                found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 2e-3)
+            }
+            (found, expected) => found.is_none() && expected.is_none(),
+        };
+        assert!(is_near, "key {index}: {windows:?}");
     }
 }
 
@@ -318,6 +335,9 @@ fn a_browser_follows_a_live_run_to_its_end() {
     let number = |look: &str, key: &str| seen[look][key].as_f64().unwrap();
     assert!(number("later", "timeNs") >= number("first", "timeNs") + 2e9, "{seen}");
     assert!(number("last", "durationNs") >= number("later", "durationNs"), "{seen}");
+    assert_eq!(seen["held"]["isPlaying"], json!(false));
+    assert_eq!(seen["held"]["endS"], seen["stillHeld"]["endS"], "the curves of a page that is paused grew");
+    assert!(number("stillHeld", "durationNs") > number("held", "durationNs") + 1e9, "{seen}");
     assert_eq!((&seen["later"]["isPlaying"], &seen["last"]["isKnown"]), (&json!(true), &json!(true)));
 }
 

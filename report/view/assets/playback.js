@@ -1,7 +1,7 @@
 // The time that is shown, and whether it goes on by itself. Times are nanoseconds since the recording's first message.
 
 /** Paces that are offered: simulated seconds in a second. */
-export const PACES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
+export const PACES = [0.01, 0.03, 0.1, 0.25, 0.5, 1, 2, 5, 10];
 
 // A recorder writes what it has each second. Where time is to be the newest and falls farther behind, it goes on from there.
 const BEHIND_NS = 2.5e9;

@@ -372,6 +372,7 @@ export class Scopes {
     this.#feeds();
     document.getElementById("add-plot").addEventListener("click", () => this.edit(null));
     document.getElementById("whole").addEventListener("click", () => this.zoom(null));
+    this.#keys();
     onTheme(() => this.#rebuild());
     let width = this.list.clientWidth;
     new ResizeObserver(() => {
@@ -380,6 +381,18 @@ export class Scopes {
       this.#rebuild();
     }).observe(this.list);
     this.refresh();
+  }
+
+  /** Keys zoom as the mouse does. */
+  #keys() {
+    const keys = { z: ({ shiftKey }) => this.zoomBy(shiftKey ? 2 : 0.5), w: () => this.zoom(null) };
+    document.addEventListener("keydown", (event) => {
+      const key = event.key.toLowerCase();
+      const isTyping = event.target.closest("select, dialog[open], textarea, input:not([type=range], [type=checkbox])");
+      if (isTyping || event.ctrlKey || event.altKey || event.metaKey || !Object.hasOwn(keys, key)) return;
+      event.preventDefault();
+      keys[key](event);
+    });
   }
 
   /** Marks of the recordings and of the live run; one that two recordings share is drawn once. */
@@ -446,9 +459,15 @@ export class Scopes {
 
   /** The recordings have come so far. */
   grow() {
-    this.endS = this.startS + this.playback.durationNs * 1e-9;
+    // A person who pauses looks at curves: they stand still until time goes on.
+    if (this.playback.isPlaying || !this.playback.isGrowing) this.#showAll();
     for (const [number, feed] of this.feeds.entries()) feed.grow(this.recordings[number].duration_ns);
     this.refresh();
+  }
+
+  /** The plots reach to the end of what is there by now. */
+  #showAll() {
+    this.endS = this.startS + this.playback.durationNs * 1e-9;
   }
 
   windowS() {
@@ -467,6 +486,26 @@ export class Scopes {
     }
     document.getElementById("whole").disabled = this.window === null;
     this.refresh();
+  }
+
+  /** Shows `factor` of the window. The present time keeps its place in it; the middle does if that time is not in it. */
+  zoomBy(factor) {
+    const [from, to] = this.windowS();
+    const nowS = this.#nowS();
+    const span = (to - from) * factor;
+    // Doubled halves may be the whole but for their rounding.
+    if (span > (1 - 1e-9) * (this.endS - this.startS)) {
+      this.zoom(null);
+      return;
+    }
+    const fixedS = nowS >= from && nowS <= to ? nowS : (from + to) / 2;
+    const start = fixedS - (fixedS - from) * factor;
+    const first = Math.min(Math.max(start, this.startS), this.endS - span);
+    this.zoom([first, first + span]);
+  }
+
+  #nowS() {
+    return this.startS + this.playback.timeNs * 1e-9;
   }
 
   seekS(seconds) {
@@ -504,7 +543,12 @@ export class Scopes {
 
   /** Moves the line of time, and the window where it runs out of it. */
   showTime() {
-    const seconds = this.startS + this.playback.timeNs * 1e-9;
+    const seconds = this.#nowS();
+    // The time that is shown has left plots that stood still. The newest samples are ahead of the curves.
+    if (!this.newest && seconds > this.endS) {
+      this.#showAll();
+      this.refresh();
+    }
     if (this.window && this.playback.isPlaying && (seconds > this.window[1] || seconds < this.window[0])) {
       const span = this.window[1] - this.window[0];
       this.zoom([seconds, seconds + span]);
