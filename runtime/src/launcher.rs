@@ -32,6 +32,7 @@ use bus::watch::WatchFiles;
 use diagnostics::Error;
 use inputs::InputFiles;
 use recorder::reader::Recording;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -536,17 +537,17 @@ fn prepare(
     for (path, text, key) in std::iter::once(whole).chain(texts) {
         let key = PathBuf::from(key.to_string_lossy().into_owned());
         files.keep(&key, text.into());
-        attachments.push(attachment(path, &key));
+        attachments.push(attachment(&file_name(path), &key));
         files.bytes(&key)?;
     }
     for path in &graph.models {
-        attachments.push(attachment(path, path));
+        attachments.push(attachment(&file_name(path), path));
         files.bytes(path).with_context(|| format!("cannot attach {}", path.display()))?;
     }
     for (name, text) in written {
         let key = run_dir.path().join(name);
         files.keep(&key, text.into_bytes());
-        attachments.push(attachment(&key, &key));
+        attachments.push(attachment(name, &key));
         files.bytes(&key)?;
     }
     for (program, node) in graph.programs.iter().zip(&mut graph.plan.nodes) {
@@ -572,9 +573,13 @@ fn figures(graph: &Graph, run_dir: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     has_judge.then(read).transpose()
 }
 
-/// Content that a recorder attaches under the name of `path`: the file `key` among those of the run.
-fn attachment(path: &Path, key: &Path) -> serde_json::Value {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+/// Name under which the file at `path` is attached: it has no slash.
+fn file_name(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
+}
+
+/// Content that a recorder attaches as `name`: the file `key` among those of the run.
+fn attachment(name: &str, key: &Path) -> serde_json::Value {
     serde_json::json!({ "name": name, "path": key })
 }
 

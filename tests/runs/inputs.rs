@@ -11,7 +11,7 @@ use std::path::Path;
 
 const VEHICLE: &str = "vehicle.toml";
 /// Attachment that lists the files of commands.
-const PROGRAMS: &str = "programs.toml";
+const PROGRAMS: &str = "hummingbus/programs.toml";
 /// The manifest's files as they lie in the repository, each with one number, and the number after an edit.
 const FILES: [(&str, &str, &str, &str); 3] = [
     ("vehicles/hummingbird.toml", VEHICLE, "mass = { value = 0.480", "mass = { value = 0.520"),
@@ -265,6 +265,30 @@ fn a_script_that_is_edited_in_flight_is_told_at_a_restart_and_the_recording_list
     assert!(attached_by(&place.path("edited.mcap")) != attached);
     replace(&place, "node.sh", &script);
     assert!(attached_by(&place.path("again.mcap")) == attached);
+}
+
+/// A run that did not go back is not said to have, and readers find the list of programs, whatever the files are called.
+#[test]
+fn a_file_that_is_called_as_an_attachment_of_the_run_does_not_take_its_place() {
+    use crate::nodes::{manifest, sender};
+    let place = Place::new();
+    let base = manifest(20, &[sender("reader", 1, "")]);
+    // As a recording of a run that went back has it; unknown tables of a manifest are refused.
+    let other = "# The run went back in flight.\n[run]\nseed = 5\n";
+    place.write("programs.toml", &base);
+    place.write("rewinds.toml", other);
+    let flown = place.write("top.toml", "include = [\"programs.toml\", \"rewinds.toml\"]\n");
+    let recording = place.path("top.mcap");
+    start(&place, &flown, &recording).end().with_code(0);
+    let attached = open(&recording).attachments().unwrap();
+    let texts = |name: &str| -> Vec<String> {
+        let found = attached.iter().filter(|(attached, _)| attached == name);
+        found.map(|(_, bytes)| String::from_utf8(bytes.clone()).unwrap()).collect()
+    };
+    assert_eq!((texts("programs.toml"), texts("rewinds.toml")), (vec![base], vec![other.to_owned()]));
+    assert!(texts(PROGRAMS)[0].contains("process = \"reader\""), "{:?}", texts(PROGRAMS));
+    let told = place.call(&["diff", &recording, &recording]).with_code(0);
+    assert!(!told.error.contains("went back"), "{told}");
 }
 
 #[test]
