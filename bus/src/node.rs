@@ -121,6 +121,11 @@ impl Node {
         self.run_dir().map(|run_dir| remark::path(run_dir, self.index, self.generation))
     }
 
+    /// Name of its process in the run.
+    pub(crate) fn process_name(&self) -> String {
+        process_name(self.name(), self.generation)
+    }
+
     /// The node's name in the run.
     #[must_use]
     pub fn name(&self) -> &str {
@@ -418,7 +423,7 @@ impl Node {
     /// As [`Node::connect`].
     pub(crate) fn announce(mut self, transport: Rc<Transport>) -> Result<AnnouncedNode, BusError> {
         let (inputs, declared_outputs) = self.declared()?;
-        let claim = claim::claim(&self.run_dir, &process_name(self.name(), self.generation))?;
+        let claim = claim::claim(&self.run_dir, &self.process_name())?;
         let lockstep = NodeView::open(&self.plan, self.index, self.generation, self.place.clone())?;
         if self.generation > 0 {
             // Every topic is announced by then.

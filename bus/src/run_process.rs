@@ -46,6 +46,8 @@ impl Registration {
 /// A node of this process before its first tick.
 pub(crate) struct Part {
     name: String,
+    /// Name of its process: a standby or a shadow has a number.
+    process: String,
     node: Option<Node>,
     wiring: Wiring,
     instance: Box<dyn Instance>,
@@ -81,8 +83,8 @@ impl Part {
         let made = registration.make_for(plan, node_plan, files, node.run_dir());
         let instance = made.map_err(|reason| node.error(reason))?;
         let (name, transfer) = (node.name().to_owned(), registration.transfer);
-        let remark_path = node.remark_path();
-        Ok(Self { name, node: Some(node), wiring, instance, transfer, remark_path })
+        let (process, remark_path) = (node.process_name(), node.remark_path());
+        Ok(Self { name, process, node: Some(node), wiring, instance, transfer, remark_path })
     }
 
     /// Name of the node.
@@ -122,13 +124,13 @@ impl Part {
 
     /// Remark of the component on the run.
     pub(crate) fn remark(&self) -> Option<Remark> {
-        Some(Remark { text: self.instance.remark()?, node: self.name.clone() })
+        Some(Remark { text: self.instance.remark()?, process: self.process.clone() })
     }
 
     /// Leaves the remark of the component where the launcher finds it.
     fn leave_remark(&self) -> Result<(), BusError> {
         let Some(path) = &self.remark_path else { return Ok(()) };
-        self.remark().map_or(Ok(()), |remark| remark.store(path))
+        self.remark().map_or(Ok(()), |remark| remark.leave(path))
     }
 
     /// The component with its state, as the computation that steps at each tick.

@@ -510,7 +510,8 @@ impl<'a> Launcher<'a> {
         supervisor.fly(manifest.content.run.start_order_seed)?;
         let mut outcome = outcome(plan, &control, &supervisor);
         outcome.replacements = supervisor.decisions.replacements.into_reports();
-        outcome.remarks = Remark::all_of(dir)?;
+        let nodes: Vec<&str> = plan.nodes.iter().map(|node| &*node.name).collect();
+        outcome.remarks = Remark::all_of(dir, &nodes)?;
         if plan.profile {
             outcome.flight = Some(Flight::open(plan, dir, outcome.ticks, &outcome.replacements)?);
         }

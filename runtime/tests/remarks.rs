@@ -76,3 +76,10 @@ fn remarks_come_from_one_thread_from_threads_and_from_a_group() {
     assert_eq!(remarks(Launcher::new(Host::Threads)), expected);
     assert_eq!(remarks(Launcher::new(Host::Threads).composed(Composition::All)), expected);
 }
+
+#[test]
+fn the_remark_of_a_shadow_names_its_process() {
+    let shadow = toml::toml! { parameters.least_ticks = 2.0 };
+    let launcher = Launcher::new(Host::Threads).shadowing("second", shadow);
+    assert_eq!(remarks(launcher), ["`first`: 50 ticks", "`second.1`: 50 ticks", "`third`: 50 ticks"]);
+}
