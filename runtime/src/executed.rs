@@ -1,6 +1,7 @@
-//! The files that the words of a run's commands name: a command opens its program and its scripts itself, and a process that is
-//! started later may get other ones.
+//! The files of a run's commands: those that their words name, and the modules that scripts in Python import from their own folders. A command
+//! opens them itself, and a process that is started later may get other ones.
 
+use crate::imported::Modules;
 use crate::program::{Executable, Program};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -42,8 +43,8 @@ struct Record<'a> {
 #[derive(PartialEq, Serialize)]
 struct Entry<'a> {
     process: &'a str,
-    /// The word of the manifest that names it.
-    file: &'a str,
+    /// The word of the manifest that names it. Of a module: its path from the same folder as the word of its script.
+    file: String,
     bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     sha256: Option<&'a str>,
@@ -130,6 +131,22 @@ fn words(program: &Program) -> impl Iterator<Item = (&str, PathBuf)> {
     })
 }
 
+/// The files of the command of `program`, each with the name that a list has for it: those that its words may name, then the modules of its scripts.
+fn files(program: &Program) -> Vec<(String, PathBuf)> {
+    let mut files: Vec<_> = words(program).map(|(word, path)| (word.to_owned(), path)).collect();
+    for (word, path) in words(program) {
+        let Some(Modules { folder, files: modules }) = Modules::of(&path) else { continue };
+        for module in modules {
+            let path = folder.join(&module);
+            if files.iter().all(|(_, known)| *known != path) {
+                let name = Path::new(word).parent().unwrap_or(Path::new("")).join(module);
+                files.push((name.to_string_lossy().into_owned(), path));
+            }
+        }
+    }
+    files
+}
+
 impl Executed {
     /// Notes the files of `programs`, with which a run begins. Returns a warning for each that has changed since the run began
     /// before, if it has gone back. They count as they are now.
@@ -146,10 +163,10 @@ impl Executed {
         programs.iter().flat_map(|(name, program)| self.note(name, program)).collect()
     }
 
-    /// Notes the files that the command of process `name`, which is about to start, names. Returns a warning for each that is another one
+    /// Notes the files of the command of process `name`, which is about to start. Returns a warning for each that is another one
     /// than at the first look, or may be.
     pub fn note(&mut self, name: &str, program: &Program) -> Vec<String> {
-        words(program).filter_map(|(_, path)| self.note_file(name, &path)).collect()
+        files(program).into_iter().filter_map(|(_, path)| self.note_file(name, &path)).collect()
     }
 
     fn note_file(&mut self, name: &str, path: &Path) -> Option<String> {
@@ -204,7 +221,7 @@ impl Executed {
     pub fn record(&self, programs: &[(&str, &Program)]) -> Result<Option<String>, toml::ser::Error> {
         let mut entries = Vec::new();
         for &(process, program) in programs {
-            for (file, path) in words(program) {
+            for (file, path) in files(program) {
                 let Some(version) = self.0.get(&path) else { continue };
                 let entry =
                     Entry { process, file, bytes: version.bytes(), sha256: version.digest.as_deref() };
@@ -217,7 +234,8 @@ impl Executed {
         if entries.is_empty() {
             return Ok(None);
         }
-        let head = "# Files that the words of commands name, as they were when the run began. Those of more than 64 MiB have no SHA-256.\n";
+        let head = "# Files that the words of commands name, and modules that scripts in Python import from their own folders, as they were when the run \
+                    began. Those of more than 64 MiB have no SHA-256.\n";
         toml::to_string(&Record { program: entries }).map(|text| Some(format!("{head}{text}")))
     }
 }
@@ -288,6 +306,35 @@ mod tests {
         assert_eq!(record, expected.parse::<toml::Table>().unwrap());
         let kind = Program { executable: Executable::Command(Vec::new()), ..Program::unknown() };
         assert_eq!(executed.record(&[("imu", &kind)]).unwrap(), None);
+    }
+
+    #[test]
+    fn a_module_that_a_script_imports_is_listed_and_told_when_it_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+        fs::create_dir(folder.path().join("laws")).unwrap();
+        write("laws/law.py", "import json, gains\n");
+        write("laws/gains.py", "from limits import THRUST\n");
+        write("laws/limits.py", "THRUST = 1\n");
+        write("laws/other.py", "");
+        let program = Program {
+            working_directory: Some(folder.path().to_owned()),
+            ..command(["python3", "laws/law.py", "laws/limits.py"])
+        };
+        let programs = [("pilot", &program)];
+        let mut executed = Executed::default();
+        assert!(executed.begin(&programs).is_empty());
+        let record: toml::Table = executed.record(&programs).unwrap().unwrap().parse().unwrap();
+        let listed = record["program"].as_array().unwrap().iter();
+        let listed: Vec<&str> = listed.map(|entry| entry["file"].as_str().unwrap()).collect();
+        assert_eq!(listed, ["laws/law.py", "laws/limits.py", "laws/gains.py"]);
+        write("laws/other.py", "edited");
+        assert!(executed.note("pilot", &program).is_empty());
+        write("laws/gains.py", "from limits import THRUST as T\n");
+        let told = executed.note("pilot", &program);
+        assert!(told.len() == 1 && told[0].contains("gains.py has changed"), "{told:?}");
+        // An output is told of words alone: no command writes its own modules.
+        assert!(executed.end(&programs).is_empty());
     }
 
     #[test]

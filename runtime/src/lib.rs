@@ -7,7 +7,7 @@
 //! | the checked plan of a run | [`graph`], `placement`, [`registry`], `program`, `describe`, `describe_programs` |
 //! | a flight of processes or threads | [`launcher`], `options`, [`event`], `outcome`, [`flight`] |
 //! | its supervisor, which decides | `supervisor`, `processes`, `sidecars`, `watch_clock` |
-//! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `executed`, `role`, `instances` |
+//! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `executed`, `imported`, `role`, `instances` |
 //! | the same supervisor in simulated worlds | `simulation` |
 //! | a flight on one thread | `in_process` |
 //! | requests to a live run | [`ctl`], [`rewind`] |
@@ -32,6 +32,7 @@ pub mod graph;
 pub mod host;
 mod host_limits;
 mod host_world;
+mod imported;
 mod in_process;
 mod instances;
 pub mod launcher;
