@@ -17,6 +17,7 @@ mod free_bodies;
 mod free_flight;
 mod golden;
 mod motors;
+mod pivots;
 mod prisms;
 mod rigs;
 mod signs;
