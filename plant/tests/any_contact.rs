@@ -3,7 +3,8 @@
 
 use crate::common;
 use crate::skipped::drawn;
-use common::{TICK_S, free_body, hummingbird};
+use common::parts::{body, given};
+use common::{TICK_S, bodies_energy_J, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::contact_dynamics::hull::Hull;
 use plant::{Airframe, Backend, Neighbour, NewtonEuler, Rapier, RigidBody};
@@ -108,6 +109,61 @@ proptest! {
         }
         let expected_m = restitution * restitution * height_m;
         prop_assert!((apex_m - expected_m).abs() < 1e-5, "{apex_m} m, not {expected_m} m");
+    }
+}
+
+/// A ball that hits the falling vehicle from the side, and a box of `box_kg` that falls on it when it has come down.
+fn thrown_at(box_kg: f64, restitution: f64) -> Scene {
+    let surface = format!(
+        "friction = {}\nrestitution = {}\n",
+        given("0.5", "1"),
+        given(&format!("{restitution:?}"), "1")
+    );
+    let mass = format!("{box_kg:?}");
+    let falls =
+        [("centre", "[0.05, 0.03, 1.4]", "m"), ("size", "[0.1, 0.08, 0.06]", "m"), ("mass", &*mass, "kg")];
+    let flies = [
+        ("centre", "[-1, 0.02, 0.7]", "m"),
+        ("radius", "0.06", "m"),
+        ("mass", "0.1", "kg"),
+        ("velocity", "[6, 0, 0]", "m/s"),
+    ];
+    let text = format!(
+        "name = \"test\"\n{surface}{}{}",
+        body("boxes", "box", &falls),
+        body("balls", "ball", &flies)
+    );
+    Scene::parse(&text, "test.toml").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The check of each run leaves out the steps in which the vehicle is near a free body: rotors do work on it. Here they stand still.
+#[test]
+fn the_vehicle_and_free_bodies_together_gain_no_energy() {
+    let turns = [Vector3::zeros(), Vector3::new(0.4, -0.3, 1.0), Vector3::new(2.8, 0.5, 0.0)];
+    for (box_kg, restitution) in
+        [(5e-3, 0.0), (5e-3, 0.6), (0.05, 1.0), (0.5, 0.3), (0.5, 1.0), (5.0, 0.0), (5.0, 0.6)]
+    {
+        for turn in turns {
+            let scene = thrown_at(box_kg, restitution);
+            let attitude_WB = UnitQuaternion::from_scaled_axis(turn);
+            let start = RigidBody { attitude_WB, ..RigidBody::level_at(Vector3::z() * 0.7) };
+            let mut plant = common::rapier(NewtonEuler::new(free_body(), 2), &scene, &start, 1e9);
+            let whole_J = |plant: &Rapier| energy_J(&plant.state().body) + bodies_energy_J(&scene, plant);
+            let mut least_J = whole_J(&plant);
+            for tick in 0..1_000 {
+                plant.step(&[0.0; 4], TICK_S, &[]);
+                let found_J = whole_J(&plant);
+                let case = format!("{box_kg} kg, restitution {restitution}, turned by {turn:?}, tick {tick}");
+                assert!(
+                    found_J < least_J + 5e-3 * (1.0 + least_J),
+                    "{case}: from {least_J} J to {found_J} J"
+                );
+                least_J = least_J.min(found_J);
+                assert_eq!(plant.trouble(), None, "{case}");
+                let pushed_m_s = plant.state().body.velocity_W_m_s.x;
+                assert!(tick != 250 || pushed_m_s > 0.05, "{case}: the ball misses, {pushed_m_s} m/s");
+            }
+        }
     }
 }
 
