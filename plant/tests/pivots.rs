@@ -1,10 +1,12 @@
 //! Boxes that pivot over an edge, against the equation of motion of a physical pendulum.
 //!
-//! A box of mass m turns by θ about a fixed line, which its centre of mass is h above and x ahead of at the start. Its height above
-//! the line is h cos θ - x sin θ, and so k² θ¨ = g (h sin θ + x cos θ), with the radius of gyration k about the line. For the edge of
-//! its own base, x < 0, that is k² θ¨ = -g l sin(α - θ): l is the distance from the line, and tan α = -x / h. The equation is
-//! integrated here by the classic Runge-Kutta scheme with steps of 10 µs; the plant
-//! integrates a body in contact by steps of 0.5 ms, to first order.
+//! A box of mass m turns by θ about a fixed line. At the start its centre of mass is h above and x ahead of the line, and at θ it is
+//! h cos θ - x sin θ above. With the radius of gyration k about the line, that gives k² θ¨ = g (h sin θ + x cos θ).
+//!
+//! About an edge of its own base, x is below 0. With tan α = -x / h and the distance l from the line, k² θ¨ = -g l sin(α - θ).
+//!
+//! The tests integrate this equation by the classic Runge-Kutta scheme with steps of 10 µs. The plant integrates a body in contact
+//! by steps of 0.5 ms, to first order.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::common;

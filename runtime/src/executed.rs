@@ -131,7 +131,8 @@ fn words(program: &Program) -> impl Iterator<Item = (&str, PathBuf)> {
     })
 }
 
-/// The files of the command of `program`, each with the name that a list has for it: those that its words may name, then the modules of its scripts.
+/// The files of the command of `program`, each with its name in the list [`RECORD`]. Those that its words may name come first, then the modules
+/// of its scripts.
 fn files(program: &Program) -> Vec<(String, PathBuf)> {
     let mut files: Vec<_> = words(program).map(|(word, path)| (word.to_owned(), path)).collect();
     for (word, path) in words(program) {

@@ -22,7 +22,8 @@ pub struct Modules {
 /// A module that a statement names.
 #[derive(Debug)]
 struct Import<'a> {
-    /// Dots in front of the name: 0 for a search from the script's folder, 1 from the folder of the importing file, 2 from the one above.
+    /// Dots in front of the name. Without dots the search begins in the script's folder, with one in the folder of the importing file,
+    /// with two in the one above.
     dots: usize,
     name: Vec<&'a str>,
 }
