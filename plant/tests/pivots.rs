@@ -1,7 +1,7 @@
 //! Boxes that pivot over an edge, against the equation of motion of a physical pendulum.
 //!
-//! A box of mass m turns by θ about a fixed line. At the start its centre of mass is h above and x ahead of the line, and at θ it is
-//! h cos θ - x sin θ above. With the radius of gyration k about the line, that gives k² θ¨ = g (h sin θ + x cos θ).
+//! A box of mass m turns by θ about a fixed line. At the start its centre of mass is h above and x ahead of the line. At θ it
+//! is h cos θ - x sin θ above. With the radius of gyration k about the line, that gives k² θ¨ = g (h sin θ + x cos θ).
 //!
 //! About an edge of its own base, x is below 0. With tan α = -x / h and the distance l from the line, k² θ¨ = -g l sin(α - θ).
 //!

@@ -10,7 +10,8 @@ use std::io::{self, Seek as _};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-/// Name of the attachment that lists the files of a run's commands. As with [`MARK`](crate::rewind::MARK), no file of a user takes its place.
+/// Name of the attachment that lists the files of a run's commands. Files of a user are attached under names without a slash:
+/// none takes its place.
 pub const RECORD: &str = "hummingbus/programs.toml";
 
 /// The files by their paths, as they were at the first look.

@@ -9,8 +9,8 @@ use serde::Serialize;
 use std::cell::{Ref, RefCell};
 use std::path::PathBuf;
 
-/// Name of the attachment that says where a recording's run went back. The files of a user are attached under their names without a
-/// folder: none of them takes the place of one with a slash.
+/// Name of the attachment that says where a recording's run went back. Files of a user are attached under names without a slash:
+/// none takes its place.
 pub const MARK: &str = "hummingbus/rewinds.toml";
 
 /// A rewind that is requested or under way.
