@@ -1,10 +1,11 @@
 //! PX4's software in the loop, SITL, by its simulator's MAVLink interface (`SimulatorMavlink.cpp` and the start-up script
 //! `init.d-posix/rcS` of PX4; read at commit a70a5583).
 //!
-//! A message of the sensors sets PX4's clock, and PX4 answers it with the motors' outputs. Its threads run beside each other all the same,
-//! and its start-up script runs by the time of the host, so that no two runs would agree. So a library is preloaded (`lockstep.c`): it lets
-//! one thread run at a time, in an order that depends on the messages alone, hands PX4 a step's messages when all threads wait, and
-//! returns what PX4 has sent by then. The firmware itself is as it was built.
+//! A message of the sensors sets PX4's clock, and PX4 answers it with the motors' outputs. Yet its threads
+//! run in parallel, and its start-up script runs by the time of the host. Without help no two runs would
+//! agree. So a library is preloaded (`lockstep.c`). It lets one thread run at a time, in an order that
+//! depends on the messages alone. When all threads wait, it hands PX4 the messages of a step, and returns
+//! what PX4 has sent by then. The firmware itself is as it was built.
 //!
 //! Axes of its messages: body forward, right, down; world north, east, down. The world's x is east, its y north
 //! ([`crate::origin`]).

@@ -167,8 +167,8 @@ impl DynamicNode {
     /// Connects, then computes `step` at every due tick until the run ends or another process has taken the node's place.
     ///
     /// # Errors
-    /// If the manifest and the declarations do not fit, two sides disagree on a layout, a step fails or leaves a due
-    /// output unwritten, or the run is aborted.
+    /// If the manifest and the declarations do not fit, or two sides disagree on a layout. If a step fails or
+    /// leaves a due output unwritten. If the run is aborted.
     pub fn run(
         mut self,
         step: impl FnMut(&mut DynamicTick<'_, '_>) -> Result<(), String>,

@@ -9,8 +9,8 @@
 //! | `rows-CHUNK-JOB-ATTEMPT.jsonl` | rows that one attempt at a chunk has flown so far |
 //! | `log-CHUNK-ARRAY.txt` | what a task printed |
 //!
-//! Each attempt has a file of its own: a task that Slurm started again never writes into the file of the one before, which
-//! may still run on a node that lost its network.
+//! Each attempt has a file of its own. A task that Slurm started again never writes into the file of the one
+//! before: that task may still run on a node that lost its network.
 
 use crate::pool::Pool;
 use crate::row::Row;

@@ -62,8 +62,8 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// Each value's distribution is cut into as many equal parts as there are flights, and each part is drawn from once
-    /// (McKay, Beckman and Conover, Technometrics 21(2), 1979).
+    /// Each value's distribution is cut into as many equal parts as there are flights. Each part is drawn
+    /// from once (McKay, Beckman and Conover, Technometrics 21(2), 1979).
     #[default]
     LatinHypercube,
     /// A Sobol sequence (directions of Joe and Kuo, SIAM J. Sci. Comput. 30(5), 2008) with a random digital shift: values fill

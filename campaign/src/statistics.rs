@@ -2,8 +2,8 @@
 
 use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, StudentsT};
 
-/// Interval of a probability of which `passed` of `flights` are known, with at least the probability `confidence` that it
-/// holds the true one (Clopper and Pearson, Biometrika 26(4), 1934).
+/// Interval of the probability to pass, from `passed` of `flights`. It holds the true one with at least the
+/// probability `confidence` (Clopper and Pearson, Biometrika 26(4), 1934).
 ///
 /// ```
 /// use campaign::statistics::clopper_pearson;
@@ -70,9 +70,10 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((rank, chance))
 }
 
-/// Chance of pass rates as different as those of `groups`, the number of flights of each and of those that passed, without any
-/// relation (chi-square test of independence). `None` for fewer than two groups, and where a group is expected to have less than
-/// one flight that passes or fails: the distribution is another one there.
+/// Chance of pass rates as different as those of `groups` if there is no relation (chi-square test of
+/// independence). Each group has its number of flights and the number of those that passed. `None` for fewer
+/// than two groups, and where a group is expected to have less than one flight that passes or fails: the
+/// distribution is another one there.
 ///
 /// ```
 /// use campaign::statistics::independence;

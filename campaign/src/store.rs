@@ -114,8 +114,8 @@ impl Store {
     /// Opens or makes `folder` for `campaign`: its plan, which is written if it is not there, and the rows flown so far.
     ///
     /// # Errors
-    /// If another campaign uses the folder, it holds something else, its flights were flown with other inputs, or a link on the way
-    /// to it is not to be trusted.
+    /// If another campaign uses the folder, it holds something else, or its flights were flown with other
+    /// inputs. If a link on the way to it is not to be trusted.
     pub fn open(
         folder: &Path,
         campaign: &Campaign,

@@ -1,8 +1,8 @@
 //! A worker: a process that flies the flights that it is handed, one after the other.
 //!
-//! It reads one JSON value a line from standard input, first an [`Order`], then a [`Job`] for each flight, and answers each
-//! with a line on standard output: a [`Greeting`], then a [`Row`] for each flight. It ends when its input ends, or with its
-//! parent.
+//! It reads one JSON value a line from standard input: first an [`Order`], then a [`Job`] for each flight. It
+//! answers each with a line on standard output: a [`Greeting`], then a [`Row`] for each flight. It ends when
+//! its input ends, or with its parent.
 
 use crate::base::Base;
 use crate::declaration::Campaign;

@@ -3,11 +3,11 @@
 //! `cargo run -p hummingbus-controllers --example random_pilot -- roll 1 > manifests/sticks/roll.csv` and
 //! `… -- pitch 2 > manifests/sticks/pitch.csv` wrote the two that are stored; a test writes them anew.
 //!
-//! The hand makes one move after another, drawn at random: a rest, a pulse, a step held for a while, each of the
-//! latter two followed by its opposite, so that the vehicle stays near its place. The wanted angle passes through
-//! the hand's slowness, a critically damped lag of second order, and a tremor is added; the stick has
-//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Only sums, products and
-//! the bus's random stream are used, so that every machine writes the same bytes.
+//! The hand makes one move after another, drawn at random: a rest, a pulse, or a step held for a while. The
+//! opposite follows each of the latter two, so that the vehicle stays near its place. The wanted angle passes
+//! through the hand's slowness, a critically damped lag of second order, and a tremor is added; the stick has
+//! its stops. All numbers are tuned, no source, but for the stops (thesis §5.3). Only sums, products and the
+//! bus's random stream are used, so that every machine writes the same bytes.
 
 use rand_core::Rng;
 

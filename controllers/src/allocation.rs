@@ -1,15 +1,15 @@
 //! Control allocation: a wrench to the speeds of the rotors, and the parts of it that are given up at their limits.
 //!
 //! A rotor at r from the centre of mass with the axis a that turns at ω makes the thrust c_T·ω²·a. Its torque on the body is
-//! r × a·c_T·ω², and against its own sense of turning −spin·c_Q·ω²·a. With axes along body z this is eq. 3.7 of the thesis
-//! with the moment arm (not the distance between the axes), and with signs that follow from the axes rather than from a rotor
-//! numbering. Of the thrust, the part along body z counts.
+//! r × a·c_T·ω², and against its own sense of turning −spin·c_Q·ω²·a. With axes along body z this is eq. 3.7
+//! of the thesis, with two changes. The arm is the moment arm, not the distance between the axes. Signs
+//! follow from the axes, not from a rotor numbering. Of the thrust, the part along body z counts.
 //!
 //! Four rotors have one set of squared speeds for each wrench: the effectiveness matrix B is inverted. More rotors have many
 //! sets: the one with the least sum of squares is taken, Bᵀ(BBᵀ)⁻¹ (Moore-Penrose; Johansen and Fossen, Control allocation: a
-//! survey, Automatica 49, 2013, section 2.2). If that is beyond the limits of a rotor, the torques are first
-//! cut to the part that fits beside the thrust, or to a share of the part that fits in hover if that is more:
-//! yaw first, then roll and pitch. Then the speeds within the limits make these torques, and come as near to
+//! survey, Automatica 49, 2013, section 2.2). If that is beyond the limits of a rotor, the torques are cut:
+//! yaw first, then roll and pitch. The part that fits beside the thrust remains, or a share of the part that
+//! fits in hover if that is more. Then the speeds within the limits make these torques, and come as near to
 //! the thrust as that allows (`bounded`).
 
 use crate::bounded::{BoundedLeastSquares, Parts};
@@ -224,9 +224,10 @@ impl Allocation {
         made.unheld().map_or(Ok(made), |part| Err(AllocationError::Unheld { rotors, working, part, spins }))
     }
 
-    /// The least and greatest thrust (N) to demand if the fraction `reserve` (0 to ½) of the range from
-    /// all rotors slowest to all fastest is kept free at either end for roll and pitch; of rotors that push downwards, from
-    /// fastest to slowest. At the lower end, the part kept free is bounded by the weight, so that strong vehicles can sink.
+    /// The least and greatest thrust (N) to demand if a part of the range is kept free at either end for roll
+    /// and pitch. The part is the fraction `reserve` (0 to ½) of the range from all rotors slowest to all
+    /// fastest. Rotors that push downwards count from fastest to slowest. At the lower end, the part kept
+    /// free is bounded by the weight, so that strong vehicles can sink.
     #[must_use]
     pub fn thrust_range_N(&self, reserve: f64) -> (f64, f64) {
         let upwards: f64 = self.effectiveness.iter().map(|rotor| rotor[0].max(0.0)).sum();
@@ -249,9 +250,9 @@ impl Allocation {
         RotorWrench { thrust_N: wrench[0], torque_B_N_m: Vector3::new(wrench[1], wrench[2], wrench[3]) }
     }
 
-    /// The speeds that make `demand`. Beyond the limits of the rotors, roll and pitch torque come first, keeping their direction,
-    /// then yaw torque, each up to a share of the rotors' torque in hover. Thrust comes last: it moves towards
-    /// hover, and not beyond.
+    /// The speeds that make `demand`. Beyond the limits of the rotors, roll and pitch torque come first, and
+    /// keep their direction. Yaw torque follows. Each reaches up to a share of the rotors' torque in hover.
+    /// Thrust comes last: it moves towards hover, and not beyond.
     #[must_use]
     pub fn allocate(&self, demand: &RotorWrench) -> Allocated {
         let squares = self.squares(demand);
@@ -723,8 +724,9 @@ mod tests {
         assert!(matches!(Allocation::new(&empty), Err(AllocationError::SpeedRange { .. })));
     }
 
-    /// A hexacopter whose rotors turn in turns cannot lose one; with two neighbours turning alike it can lose most (Du, Quan,
-    /// Yang and Cai, Controllability analysis for multirotor helicopter rotor degradation and failure, JGCD 38(5), 2015).
+    /// A hexacopter whose rotors turn in turns cannot lose one. With two neighbours turning alike it can lose
+    /// most. Source: Du, Quan, Yang and Cai, Controllability analysis for multirotor helicopter rotor
+    /// degradation and failure, JGCD 38(5), 2015.
     #[test]
     fn a_hexacopter_flies_on_without_a_rotor_or_is_refused_by_its_spins() {
         let turns_in_turns = |failed: usize| {

@@ -1,12 +1,12 @@
 //! Least squares within bounds: the squared speeds that come nearest to a demand beyond the rotors' limits.
 //!
-//! Minimises |W (B x − d)|² + ε² |x|² over least ≤ x ≤ 1, where x are the squared speeds in parts of the greatest, and the
-//! rows of B and d are roll, pitch, yaw and thrust, each divided by its size. The weights W make the
+//! Minimises |W (B x − d)|² + ε² |x|² over least ≤ x ≤ 1. x are the squared speeds as parts of the greatest.
+//! The rows of B and d are roll, pitch, yaw and thrust, each divided by its size. The weights W make the
 //! priorities: a part of higher priority may cost any amount of the lower ones. Solved by an active set: the
-//! rotors at a bound are held there while the others solve the unbounded problem, and one is released where
-//! that brings the demand nearer (Härkegård, Efficient active set algorithms for solving constrained least
-//! squares problems in aircraft control allocation, CDC 2002; Smeur, de Wagter and Höppener, Prioritized
-//! control allocation for quadrotors subject to saturation, IMAV 2017).
+//! rotors at a bound are held there while the others solve the unbounded problem. A rotor is released where
+//! that brings the demand nearer. Sources: Härkegård, Efficient active set algorithms for solving constrained
+//! least squares problems in aircraft control allocation, CDC 2002; Smeur, de Wagter and Höppener,
+//! Prioritized control allocation for quadrotors subject to saturation, IMAV 2017.
 
 use nalgebra::{SMatrix, SVector, Vector4};
 use vehicles::ROTORS_MAX;

@@ -2,12 +2,13 @@
 //! around rate loop, and the altitude loop beside them; from set point and measurement to a wrench.
 //!
 //! - Command filter: roll and pitch are cut to ±30° and filtered, x'' = ω²(c − x) − 2ζω x'. Where half a turn is allowed,
-//!   nothing is cut, and the command comes round as the vehicle does: a ramp of 360° is a flip. The yaw command
-//!   turns towards the yaw set point no faster than a yaw stick at full deflection would integrate
-//!   it, comes round at 360°, and is set to the measured yaw as long as no thrust is asked for.
-//! - Attitude loop: error of roll, pitch and yaw, times a gain, and a part of the filtered commands' own rates,
-//!   to their rates of change, and by the kinematics of the z-y-x sequence to body rates (the inverse of thesis eq. 3.18).
-//!   Command filter and attitude loop may compute on every n-th step only, `attitude_every_steps`: the rates stay between.
+//!   nothing is cut, and the command comes round as the vehicle does: a ramp of 360° is a flip. The yaw
+//!   command turns towards the yaw set point no faster than a yaw stick at full deflection would integrate it.
+//!   It comes round at 360°. As long as no thrust is asked for, it is set to the measured yaw.
+//! - Attitude loop: the rates of change of roll, pitch and yaw are the error times a gain, and a part of the
+//!   filtered commands' own rates. The kinematics of the z-y-x sequence turn them to body rates (the inverse
+//!   of thesis eq. 3.18). Command filter and attitude loop may compute on every n-th step only,
+//!   `attitude_every_steps`: the rates stay between.
 //! - Rate loop: α = Kp·e + ∫Ki·e dt − Kd·dω/dt with e the error of a body rate; torque = inertia · α. The
 //!   cross product of rate and angular momentum is left to the loops.
 

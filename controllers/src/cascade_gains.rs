@@ -1,8 +1,8 @@
 //! The gains of the cascade's loops: the signal that each multiplies, and the reason why ours are not the thesis's.
 //!
 //! Table 5.1 read as a cascade has an attitude gain of 25/6 = 4.2 1/s on a rate gain of 6 1/s, and no
-//! derivative of the rate. Behind the motors' lag (ω_n = 15.08 rad/s, ζ = 0.603, thesis §4.2), broken at the
-//! torque and with the tick's delay, the linearised roll loop has these margins:
+//! derivative of the rate. The linearised roll loop has these margins behind the motors' lag
+//! (ω_n = 15.08 rad/s, ζ = 0.603, thesis §4.2). The loop is broken at the torque and has the tick's delay:
 //!
 //! | attitude, rate P, I, D | phase margin | gain margin |
 //! |---|---|---|

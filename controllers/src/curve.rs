@@ -2,10 +2,10 @@
 //! stops them.
 //!
 //! A curve is a function of a phase θ, and θ of time: θ′ rises from 0 to the cruising rate, keeps it, and falls back to
-//! 0. Its rise is the polynomial whose first four derivatives vanish at both ends, so that the position's first five
-//! are continuous, at rest and on the move. The derivatives of the position by time follow from those by phase with the
-//! formula of Faà di Bruno (M. Abramowitz and I. A. Stegun, "Handbook of Mathematical Functions", 24.1.2): nothing is
-//! differenced.
+//! 0. Its rise is the polynomial whose first four derivatives vanish at both ends. So the position's first
+//! five derivatives are continuous, at rest and on the move. The derivatives of the position by time
+//! follow from those by phase with the formula of Faà di Bruno (M. Abramowitz and I. A. Stegun, "Handbook
+//! of Mathematical Functions", 24.1.2): nothing is differenced.
 
 use nalgebra::Vector3;
 use std::f64::consts::TAU;

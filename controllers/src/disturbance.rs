@@ -1,10 +1,10 @@
 //! The acceleration that the model does not explain: drag, wind, an error of mass or thrust.
 //!
-//! An observer of Luenberger's kind (K. J. Åström and R. M. Murray, "Feedback Systems", section 8.2) runs the velocity
-//! along, v̂′ = a + d̂ + 2ω·(v − v̂) and d̂′ = ω²·(v − v̂), where a is the acceleration by the foreseen thrust
+//! A Luenberger observer (K. J. Åström and R. M. Murray, "Feedback Systems", section 8.2) estimates the
+//! velocity: v̂′ = a + d̂ + 2ω·(v − v̂) and d̂′ = ω²·(v − v̂). a is the acceleration by the foreseen thrust
 //! of the rotors at the estimated attitude. Both of its poles lie at ω. Where the model holds, d̂ stays zero
-//! however the vehicle is steered, so it takes nothing from the margins of the loop that it serves. Against the
-//! disturbance it does an integrator's work without an integrator's overshoot.
+//! however the vehicle is steered, so it takes nothing from the margins of the loop that it serves. Against
+//! the disturbance it does an integrator's work without an integrator's overshoot.
 
 use crate::control::MotionEstimate;
 use diagnostics::unit::ACCELERATION;

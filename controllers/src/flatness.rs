@@ -2,10 +2,10 @@
 //!
 //! A quadrotor pushes along its own z only, so the direction of the thrust fixes body z, and the yaw the rest.
 //! Differentiating that twice gives the angular velocity and acceleration (D. Mellinger and V. Kumar, "Minimum snap
-//! trajectory generation and control for quadrotors", ICRA 2011, section III). Yaw is that of the z-y-x sequence, so
-//! body x lies in the vertical plane of the heading, x_B ∥ y_C × z_B with y_C level and left of the heading, as in
-//! M. Faessler, A. Franchi and D. Scaramuzza, "Differential flatness of quadrotor dynamics subject to rotor drag",
-//! RA-L 2018. The yaw's own acceleration is taken as zero.
+//! trajectory generation and control for quadrotors", ICRA 2011, section III). Yaw is that of the z-y-x
+//! sequence, so body x lies in the vertical plane of the heading. x_B ∥ y_C × z_B with y_C level and left of
+//! the heading, as in M. Faessler, A. Franchi and D. Scaramuzza, "Differential flatness of quadrotor dynamics
+//! subject to rotor drag", RA-L 2018. The yaw's own acceleration is taken as zero.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 

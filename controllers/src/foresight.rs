@@ -172,8 +172,8 @@ impl Foresight {
         if is_finite && !is_far { made } else { self.hover() }
     }
 
-    /// The same of a wrench that changes. A lag that rises evenly is its delay behind the demand, so the wrench
-    /// that is that much ahead has to be one that the rotors can make.
+    /// The same of a wrench that changes. If a demand rises evenly, the wrench lags behind it by the delay of
+    /// the lag. So the rotors have to be able to make the wrench that is this much ahead.
     fn possible_change(&self, made: &Made) -> Made {
         let (now, delay_s) = (self.possible(&made.wrench), self.lag.delay_s());
         let ahead = self.possible(&RotorWrench {

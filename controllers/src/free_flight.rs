@@ -1,8 +1,8 @@
 //! The thesis's free flight (§5.5, States 1 to 5): a tilt by the distance to the wall ahead, and nothing else.
 //!
 //! "The pitch angle command is the function of the distance to the wall […] and decreases as it got closer to the wall."
-//! The thesis does not give the function; here it is the simplest: a tilt that falls in proportion to the
-//! distance still to go, from the full one where that is `fall_m` or more to none where it is zero. No loop is
+//! The thesis does not give the function; here it is the simplest. The tilt is full as long as the distance
+//! still to go is `fall_m` or more. Below, it falls in proportion to that distance, to zero. No loop is
 //! closed over the velocity, so that without drag it rises all the way to the reference distance.
 
 use diagnostics::unit::LENGTH;

@@ -128,8 +128,8 @@ pub(crate) struct Table<'d, 't> {
     opened: Rc<Opened<'d, 't>>,
 }
 
-/// The most that a gain is, in its unit: a loop that is closed once a tick of 1 µs, the shortest, holds an angle with
-/// less than 4/T², a rate with less than 2/T, and is far from either with every motor.
+/// Greatest gain, in its unit. A loop that is closed once a tick T holds an angle with less than 4/T², and a
+/// rate with less than 2/T. The shortest tick is 1 µs. With every motor, gains are far from both limits.
 pub(crate) const GAIN: Bounds = Bounds {
     min: 0.0,
     max: 1e9,

@@ -1,8 +1,8 @@
 //! The gains of the `geometric` controller: `controllers/gains/geometric.toml` and files like it.
 //!
-//! Linearised about hover the law's loop is broken at the motors by
-//! L(s) = [(s² + k_v·s + k_p)(s² + k_Ω·s + k_R) − s⁴]/s⁴ · G(s), where G is the hurried lag of the motors and 1.5 ms of
-//! computing and holding. For the gains of the built-in file:
+//! Linearised about hover and broken at the motors, the law's loop is L(s) = [(s² + k_v·s + k_p)(s² + k_Ω·s +
+//! k_R) − s⁴]/s⁴ · G(s). G is the hurried lag of the motors and 1.5 ms of computing and holding. For the
+//! gains of the built-in file:
 //!
 //! | motors | phase margin | gain margin | greatest sensitivity |
 //! |---|---|---|---|

@@ -1,6 +1,7 @@
-//! The five states of wall following (thesis Fig 5.36) and where each flies: 1 along the heading's +x from the middle to
-//! the first wall, then 2 along −y, 3 along −x, 4 along +y, 5 along +x, then 2 again: clockwise seen from above, with the
-//! wall to the left. A lap is complete where 5 gives way to 2.
+//! The five states of wall following (thesis Fig 5.36) and their directions. State 1 flies along the
+//! heading's +x from the middle to the first wall. Then 2 flies along −y, 3 along −x, 4 along +y, 5 along +x,
+//! then 2 again. Seen from above this is clockwise, with the wall to the left. A lap is complete where 5
+//! gives way to 2.
 
 /// One of the four beams: 0 is +x, 1 is −x, 2 is +y, 3 is −y of the heading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

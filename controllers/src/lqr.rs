@@ -1,10 +1,11 @@
 //! The linear-quadratic regulator about hover, made to follow a reference.
 //!
 //! The gain K of `riccati` for the model of `lqr_model` is computed at the start from the vehicle file and the weights. The
-//! demand is u = u_d − K·(x − x_d): x_d is what the reference's acceleration, jerk and snap and the observed disturbance
-//! need by `flatness` (attitude, rates, wrench), u_d the wrench that the motors, which lag by 2ζ/ω_n, have to be asked for
-//! to make it. Position and velocity are compared in axes that turn with the vehicle's heading, attitude and rates in the
-//! axes of x_d. So any yaw and any tilt of the reference is a hover to the regulator.
+//! demand is u = u_d − K·(x − x_d): x_d is the attitude, the rates and the wrench that the reference's
+//! acceleration, jerk and snap and the observed disturbance need (`flatness`). The motors lag by 2ζ/ω_n: u_d
+//! is the wrench to demand of them so that they make that of x_d. Position and velocity are compared in axes
+//! that turn with the vehicle's heading, attitude and rates in the axes of x_d. So any yaw and any tilt of
+//! the reference is a hover to the regulator.
 
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;

@@ -1,12 +1,12 @@
 //! The model that the `lqr` regulates: a quadrotor about hover, its motors' lag included.
 //!
-//! States, as deviations from hover, in axes that turn with the heading: position and velocity (level x, y and z up),
-//! rotation vector and angular rate of the body, the wrench that the rotors make and its rate of change, 20 in all.
-//! Inputs: the demanded wrench. About hover a nose-down pitch accelerates along x and a roll to the right, which is
-//! negative, along −y: v′ = (g·θ_y, −g·θ_x, T/m), θ′ = ω, ω′ = J⁻¹·τ (the thesis's eq. 3.12 and 3.17, linearised), and
-//! the wrench follows its demand as `motor_lag` says. The Hummingbird's motors (15 rad/s) are as slow as the attitude
-//! loop is fast, so a regulator that left them out would not be stable. The step from tick to tick is exact for a
-//! demand that is held: the exponential of both matrices in one.
+//! The 20 states are deviations from hover, in axes that turn with the heading. They are position and
+//! velocity (level x, y and z up), rotation vector and angular rate of the body, the rotors' wrench and its
+//! rate. Inputs: the demanded wrench. About hover a nose-down pitch accelerates along x and a roll to the
+//! right, which is negative, along −y: v′ = (g·θ_y, −g·θ_x, T/m), θ′ = ω, ω′ = J⁻¹·τ (the thesis's eq. 3.12
+//! and 3.17, linearised), and the wrench follows its demand as `motor_lag` says. The Hummingbird's motors (15
+//! rad/s) are as slow as the attitude loop is fast, so a regulator that left them out would not be stable.
+//! The step from tick to tick is exact for a demand that is held: the exponential of both matrices in one.
 
 use crate::lqr_gains::LqrGains;
 use crate::motor_lag;

@@ -1,11 +1,12 @@
 //! Minimum-snap paths through waypoints, from rest to rest.
 //!
-//! Among all paths that meet the waypoints at given times, the one with the least integral of squared snap is a
-//! polynomial of degree 7 between waypoints whose first six derivatives are continuous in them: the Euler–Lagrange
-//! equation of the integral makes the eighth derivative vanish, and the free derivatives at a waypoint settle the rest
-//! (D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011, solve the
-//! same problem as a quadratic programme). Without inequalities it is a system of linear equations, solved once at the
-//! start. Each leg has a time of its own from 0 to 1, which keeps the system well conditioned.
+//! Among all paths that meet the waypoints at given times, one has the least integral of squared snap. It is
+//! a polynomial of degree 7 between waypoints, and its first six derivatives are continuous in them: the
+//! Euler–Lagrange equation of the integral makes the eighth derivative vanish, and the free derivatives at a
+//! waypoint settle the rest (D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for
+//! quadrotors", ICRA 2011, solve the same problem as a quadratic programme). Without inequalities it is a
+//! system of linear equations, solved once at the start. Each leg has a time of its own from 0 to 1, which
+//! keeps the system well conditioned.
 #![allow(
     clippy::disallowed_types,
     reason = "a system that is factorised, and no product: see the decision on numbers"
@@ -125,8 +126,8 @@ impl System {
     }
 }
 
-/// Times between waypoints at this mean speed: those of a point that gains speed evenly over the first quarter of the
-/// time along the straight lines, keeps it, and loses it over the last.
+/// Times between waypoints at this mean speed, of a point on the straight lines. It gains speed evenly over
+/// the first quarter of the time, keeps it, and loses it over the last quarter.
 pub fn spans_at_mean_speed(waypoints_W_m: &[Vector3<f64>], mean_speed_m_s: f64) -> Vec<f64> {
     let lengths_m: Vec<f64> = waypoints_W_m.windows(2).map(|ends| (ends[1] - ends[0]).norm()).collect();
     let total_m: f64 = lengths_m.iter().sum();

@@ -3,10 +3,11 @@
 //!
 //! Near hover every component of the wrench follows its demand as a rotor's speed follows its command:
 //! w″ = ω_n²·(u − w) − 2ζ·ω_n·w′ for a motor of second order, w′ = (u − w)/τ for one of first (the vehicle file's
-//! `[motor]`). No sensor measures rotor speeds, so w is foreseen from the demands. With w and w′ at hand the demand
-//! u = w + [ω_f²·(v − w) − 2ζ_f·ω_f·w′ + 2ζ·ω_n·w′]/ω_n² makes w follow the wanted v as a motor of ω_f and ζ_f would:
-//! the poles of the lag are placed anew (K. J. Åström and R. M. Murray, "Feedback Systems", section 7.2, state
-//! feedback). The foreseen w follows what the allocation could make of the demand, so saturation winds nothing up.
+//! `[motor]`). No sensor measures rotor speeds, so w is foreseen from the demands. With w and w′ at hand the
+//! demand is u = w + [ω_f²·(v − w) − 2ζ_f·ω_f·w′ + 2ζ·ω_n·w′]/ω_n². It makes w follow the wanted v as a motor
+//! of ω_f and ζ_f would: the poles of the lag are placed anew (K. J. Åström and R. M. Murray, "Feedback
+//! Systems", section 7.2, state feedback). The foreseen w follows what the allocation could make of the
+//! demand, so saturation winds nothing up.
 
 use crate::allocation::RotorWrench;
 use diagnostics::unit::PURE_NUMBER;

@@ -2,12 +2,13 @@
 //!
 //! X = AᵀXA − AᵀXB·(R + BᵀXB)⁻¹·BᵀXA + Q is solved by the structure-preserving doubling algorithm of E. K.-W. Chu,
 //! H.-Y. Fan and W.-W. Lin, "A structure-preserving doubling algorithm for continuous-time algebraic Riccati equations",
-//! Linear Algebra and its Applications 396 (2005), section 2: with G = B·R⁻¹·Bᵀ, H = Q and W = I + G·H it repeats
-//! A ← A·W⁻¹·A, G ← G + A·W⁻¹·G·Aᵀ, H ← H + Aᵀ·H·W⁻¹·A (all right-hand sides of the step before), and H tends to X
-//! quadratically where the system can be stabilised and every state that does not fade is weighed.
+//! Linear Algebra and its Applications 396 (2005), section 2. It starts with G = B·R⁻¹·Bᵀ and H = Q. With
+//! W = I + G·H it repeats A ← A·W⁻¹·A, G ← G + A·W⁻¹·G·Aᵀ, H ← H + Aᵀ·H·W⁻¹·A. All right-hand sides are of
+//! the step before. H tends to X quadratically if the system can be stabilised and every state that does not
+//! fade is weighed.
 //!
-//! The sizes are in the types: products of matrices whose sizes are found at run time are computed with whatever
-//! instructions the processor has, and differ in the last digits from one to another.
+//! The sizes are in the types. Products of matrices whose sizes are found at run time are computed with the
+//! processor's own instructions. They differ in the last digits from one processor to another.
 
 use nalgebra::{Const, DimMin, SMatrix, ToTypenum};
 

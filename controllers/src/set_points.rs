@@ -151,8 +151,8 @@ impl Schedule {
     /// The schedule that `entries` describe from `initial` on, at `tick_rate_hz` ticks a second.
     ///
     /// # Errors
-    /// Entries that have an unknown kind, channel or unit, a key that their kind lacks or does not know, or a
-    /// time that is negative or not finite; all of these faults.
+    /// Entries that have an unknown kind, channel or unit. Keys that a kind lacks or does not know. Times
+    /// that are negative or not finite. The error has all of these faults.
     pub fn new(
         entries: &[SetPointEntry],
         initial: &SetPoint,

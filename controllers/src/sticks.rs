@@ -158,8 +158,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The faults of all rows, of which `first` is one: the first row of another length than the header's, the first time that is not
-    /// after the row before, and the first faulty cell of each column.
+    /// The faults of all rows, of which `first` is one. They are the first row of another length than the
+    /// header's, the first time that does not increase, and each column's first faulty cell.
     fn faults(&self, first: ParameterError) -> ParameterError {
         let rows = self.table.rows.iter();
         let whole = || rows.clone().filter(|cells| self.require_length(*cells).is_ok());

@@ -1,10 +1,10 @@
 //! Velocity PD around the cascade (thesis Fig 5.47): a velocity along the heading's level axes to roll and
 //! pitch commands.
 //!
-//! a = a_ff + Kp·(v_c − v) − Kd·dv/dt + integral, cut to a limit. At constant height the thrust is
-//! m·g / (cos φ·cos θ), and its level part accelerates by g·tan θ along the heading's x and by −g·tan φ / cos θ
-//! along its y. So θ = atan(a_x / g), positive for nose down, and φ = −atan(a_y·cos θ / g).
-//! The integral and a_ff are the guidance's; a law without guidance has none, as the thesis's.
+//! a = a_ff + Kp·(v_c − v) − Kd·dv/dt + integral, cut to a limit. At constant height the thrust is m·g / (cos
+//! φ·cos θ). Its level part accelerates by g·tan θ along the heading's x and by −g·tan φ / cos θ along its y.
+//! So θ = atan(a_x / g), positive for nose down, and φ = −atan(a_y·cos θ / g). The integral and a_ff are the
+//! guidance's; a law without guidance has none, as the thesis's.
 
 use crate::airframe::HoverModel;
 use crate::allocation::RotorWrench;

@@ -6,13 +6,13 @@
 //! - Mode *varying*: the velocity ahead shrinks with the distance to the wall ahead, and with it the tilt; the
 //!   velocity across is held at zero. Nothing holds the distance to the wall beside.
 //! - Mode *constant*: the velocity across is the `Approach` curve over the error of the distance to the wall
-//!   beside, and the velocity ahead is the rest of the constant speed, √(v² − v_across²). The next state
-//!   begins where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed.
-//!   So the velocity command turns in a corner without changing its length, and there is no jump in it.
-//!   An integrator over that error compensates a tilted attitude estimate.
+//!   beside. The velocity ahead is the rest of the constant speed, √(v² − v_across²). The next state begins
+//!   where the curve's velocity towards the wall ahead, which is then the one beside, equals the speed. So
+//!   the velocity command turns in a corner without changing its length, and there is no jump in it. An
+//!   integrator over that error compensates a tilted attitude estimate.
 //!
-//! If the room's size is known ([`Room`]), other vehicles in the beams are told from walls, and one that is
-//! ahead slows the vehicle down to a stop.
+//! If the room's size is known ([`Room`]), other vehicles in the beams are distinguished from walls. A
+//! vehicle that is ahead slows this one down to a stop.
 
 use crate::allocation::RotorWrench;
 use crate::approach::Approach;

@@ -3,8 +3,9 @@
 //! The five states of `legs`; each gives way to the next where the wall ahead is at the reference distance.
 //!
 //! - Mode *varying* (Figs 5.36–5.45): the tilt towards the wall ahead is a function of the distance to it
-//!   (`FreeFlight`), and the PD sets the velocity across to zero, which is also what brakes the flight of the state
-//!   before. The vehicle therefore stops where it comes to rest, and "does not keep its distance to walls constant".
+//!   (`FreeFlight`). The PD sets the velocity across to zero, which also brakes the flight of the state
+//!   before. The vehicle therefore stops where it comes to rest, and "does not keep its distance to walls
+//!   constant".
 //! - Mode *constant* (Figs 5.46–5.54): the PD holds constant velocity commands, the speed ahead and zero across, which
 //!   change in steps as the states switch. At a low speed the vehicle comes to rest not far within the distance.
 //!
@@ -108,8 +109,9 @@ pub struct Parameters {
     /// Gains file, relative to the manifest.
     #[parameter(shown = "the gains of controllers/gains/wall-follow-thesis.toml", file = crate::gains_file::FILE)]
     gains: Option<PathBuf>,
-    /// A tilt towards the wall ahead that falls with the distance to it, and no velocity across (Figs 5.36–5.45), or velocity commands
-    /// that switch in steps with the states (Figs 5.46–5.54).
+    /// Kind of command. `varying`: a tilt towards the wall ahead that falls with the distance to it, and no
+    /// velocity across (Figs 5.36–5.45). `constant`: velocity commands that switch in steps with the states
+    /// (Figs 5.46–5.54).
     #[parameter(range = "`varying`, `constant`", example = "\"varying\"")]
     mode: Mode,
     /// Height above what is below.

@@ -138,8 +138,8 @@ pub struct Parameters {
 
 /// Beyond this the sensors' reach of 7.65 m (thesis §5.5) leaves too little to brake in.
 const DISTANCE_MAX_M: f64 = 5.0;
-/// Greatest cruise speed. If no wall is in sight, the estimate's distance is the sensors' reach, and
-/// the approach to a wall there keeps the speed below this in any case.
+/// Greatest cruise speed. If no wall is in sight, the estimate's distance is the sensors' reach. The approach
+/// to a wall there keeps the speed below this in any case.
 const SPEED_MAX_M_S: f64 = 3.0;
 
 impl Law for WallStopLaw {

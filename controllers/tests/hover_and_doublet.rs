@@ -1,5 +1,5 @@
-//! The thesis's first scenario (Figs 5.1–5.5) in a closed loop: hover from 1.0 to 1.5 m at 2 s, then a
-//! roll doublet of ±10° at 6 s, with a noisy IMU and the complementary filter between plant and law.
+//! The thesis's first scenario (Figs 5.1–5.5) in a closed loop: hover from 1.0 to 1.5 m at 2 s, then a roll
+//! doublet of ±10° at 6 s. A noisy IMU and the complementary filter are between plant and law.
 
 use bus::messages::AttitudeEstimate;
 use controllers::airframe::ControlledVehicle;
@@ -152,8 +152,8 @@ fn report(name: &str, flight: &Flight) {
     );
 }
 
-/// The scenario's bounds: altitude within 2 % 3 s after the step, roll to 10° (at least 9°) with less
-/// than 25 % of overshoot, and within 1° one second after the doublet.
+/// The scenario's bounds. The altitude is within 2 % 3 s after the step. Roll reaches 10° (at least 9°) with
+/// less than 25 % of overshoot, and is within 1° one second after the doublet.
 #[track_caller]
 fn assert_flown(name: &str, flight: &Flight) {
     report(name, flight);

@@ -145,8 +145,9 @@ pub unsafe fn places<'a, T>(first: *mut T, count: usize) -> &'a mut [T] {
     if count == 0 { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(first, count) } }
 }
 
-/// Declares functions of the standard that are refused. They take the instance and ignore the arguments behind it, which the callers
-/// of both platforms' C put in registers and on the stack and take away themselves.
+/// Declares functions of the standard that are refused. They take the instance and ignore the arguments
+/// behind it. In the C of both platforms the caller puts these in registers and on the stack, and removes
+/// them.
 macro_rules! refused {
     ($($function:ident)*) => {
         $(

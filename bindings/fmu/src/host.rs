@@ -254,8 +254,8 @@ impl Program for Host {
     }
 }
 
-/// A number that differs for another FMU, and for the same with other start values, which are part of its state, or another
-/// period, in which its time is counted.
+/// Hash of an FMU, its start values and its period. Start values are part of its state, and its time is
+/// counted in periods.
 fn configuration(fmu: &[u8], start: &BTreeMap<String, Value>, period_s: f64) -> u64 {
     let text = format!("{} {} {period_s:?}", sha256(fmu), serde_json::json!(start));
     u64::from_str_radix(&sha256(text.as_bytes())[..16], 16).unwrap_or_default()

@@ -251,8 +251,8 @@ impl Odometry {
     /// Numbers of a covariance of six.
     const COVARIANCE: [f64; 36] = [0.0; 36];
 
-    /// The frame `child` at `position` (m) in the world, turned by `orientation` (child to world), with velocity (m/s) and angular
-    /// velocity (rad/s) in the axes of `child`.
+    /// The frame `child` at `position` (m) in the world, turned by `orientation` (child to world). Velocity
+    /// (m/s) and angular velocity (rad/s) are in the axes of `child`.
     #[must_use]
     pub fn new(
         child: &FrameName,

@@ -1,5 +1,5 @@
-//! A closed loop around a law that follows a reference: the Hummingbird with drag that the law does not know, and an
-//! estimate with the noise of motion capture at 100 Hz and of the IMU's gyroscope.
+//! A closed loop around a law that follows a reference. The vehicle is the Hummingbird with drag that the law
+//! does not know. The estimate has the noise of motion capture at 100 Hz and of the IMU's gyroscope.
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 

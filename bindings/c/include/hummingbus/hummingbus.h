@@ -234,8 +234,8 @@ const void *hb_tick_input(struct HbTick *tick,
 void *hb_tick_output(struct HbTick *tick,
                      uint32_t output);
 
-// The message that the process whose place this one takes sent last on output `output`, at the tick at which it takes it
-// and only where no state was handed over: to go on from without a jump. Null at every other tick.
+// The last message on output `output` of the process whose place this one takes: to go on from without a jump.
+// Given at the tick of the take-over, and only if no state was handed over. Null at every other tick.
 //
 // # Safety
 // As `hb_tick_number`.
