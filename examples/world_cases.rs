@@ -1,8 +1,8 @@
 //! Flies the cases that docs/world.md compares with closed forms, MuJoCo and RotorPy, and prints them as one line of
 //! JSON: the vehicle, and for each case its states at every tick. `scripts/world` reads it.
 //!
-//! A state is the time, position, velocity (world, m and m/s), attitude (quaternion, w first), angular velocity (body,
-//! rad/s), and the rotors' speeds and accelerations (rad/s, rad/s^2).
+//! A state is the time, position and velocity (world, m and m/s), attitude (quaternion, w first) and angular
+//! velocity (body, rad/s). The rotors' speeds and accelerations follow (rad/s, rad/s^2).
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use nalgebra::{UnitQuaternion, Vector3};

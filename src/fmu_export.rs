@@ -307,8 +307,8 @@ fn write(
     Ok(Exported { bytes: bytes.into_inner(), model, cut: Vec::new() })
 }
 
-/// The plan without references to this machine. Paths begin at `/fmu` instead of the folder that all files lie in, no
-/// node has a core, and the memory of the run has no name.
+/// The plan without references to this machine. Paths begin at `/fmu` instead of the folder that all files
+/// lie in. No node has a core, and the memory of the run has no name.
 fn portable(plan: &Plan) -> Plan {
     let mut plan = Plan { run_id: "fmu".to_owned(), clock_cpu: None, ..plan.clone() };
     let paths: Vec<PathBuf> =

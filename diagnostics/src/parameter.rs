@@ -247,8 +247,9 @@ impl ParameterError {
         }
     }
 
-    /// The question for the known key that an unknown one was probably meant to be, or for the name, of a value that is one of several;
-    /// or the line to write in place of a number in quotation marks.
+    /// Advice on a likely mistake. For an unknown key, or a value that is one of several, it asks for the
+    /// known name that was probably meant. For a number in quotation marks it is the line to write in its
+    /// place.
     ///
     /// ```
     /// use diagnostics::ParameterError;

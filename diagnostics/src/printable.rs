@@ -128,9 +128,10 @@ fn escaped(text: &str, is_kept: impl Fn(char) -> bool, push: impl Fn(&mut String
         .into()
 }
 
-/// True if a terminal shows the character and leaves the characters around it where they are. False for control
-/// characters, the controls of the direction of writing (Unicode's `Bidi_Control`), separators of lines, and
-/// characters without width (`Default_Ignorable_Code_Point`, but for the variation selectors of emoji).
+/// True if a terminal shows the character and leaves the characters around it where they are. False for
+/// control characters, the controls of the direction of writing (Unicode's `Bidi_Control`) and separators of
+/// lines. False also for characters without width (`Default_Ignorable_Code_Point`, but for the variation
+/// selectors of emoji).
 #[must_use]
 pub fn is_printable(c: char) -> bool {
     let is_hidden = matches!(c,

@@ -167,8 +167,8 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The names that `entry` gives for a sample of `quantity` of a vehicle with so many `rotors`, those of its parts for an
-/// array, and the sample's form.
+/// The names that `entry` gives for a sample of `quantity` of a vehicle with so many `rotors`, and the
+/// sample's form. For an array the names are those of its parts.
 fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [Name]>, Shape), LogError> {
     let refused = |key, expected: &str, found: &str, advice| {
         Err(LogError::unexpected(Spot::Key(key), expected, found, advice))

@@ -12,8 +12,9 @@ const HELD_SHARE: f64 = 0.1;
 const REGULAR_SHARE: f64 = 0.9;
 /// And this is how far from it a length may be, as a share of it.
 const REGULAR_TOLERANCE: f64 = 0.25;
-/// A sensor is coarse if it explains this share of the repeats. In simulated flights coarse gyroscopes and positions explain 0.65
-/// and more, those that are held on another grid 0.22 and less, unless they are coarse as well.
+/// A sensor is coarse if it explains this share of the repeats. In simulated flights, coarse gyroscopes and
+/// positions explain 0.65 and more. Those that are held on another grid explain 0.22 and less, unless they
+/// are coarse as well.
 const COARSE_SHARE: f64 = 0.4;
 /// Changes over which the vehicle moves alike.
 const WINDOW: usize = 20;

@@ -15,8 +15,8 @@ use vehicles::held_commands;
 const NAMED: usize = 5;
 /// A vehicle that nothing carries is pushed by less than this part of gravity, and falls by more than the rest of it.
 const CARRIED: f64 = 0.5;
-/// Rotors that stop carry less within a short time already: the specific force falls by this part of gravity at least, and in fewer
-/// than this part of all times of the flight by as much.
+/// Rotors that stop carry less within a short time already: the specific force falls by this part of gravity
+/// at least. It falls by as much in fewer than the part [`DROPS_ELSEWHERE`] of all times of the flight.
 const DROP: f64 = 0.2;
 const DROPS_ELSEWHERE: f64 = 0.05;
 /// Fewer other times of the same length say nothing.

@@ -1,5 +1,6 @@
-//! Check that flights are held out: none with role `test` holds samples that parameters are fitted or effects are chosen on,
-//! none with role `select` samples that parameters are fitted on, by its log and time or by its samples.
+//! Check that flights are held out. None with role `test` holds samples that parameters are fitted or effects
+//! are chosen on. None with role `select` holds samples that parameters are fitted on. The log with the time,
+//! or the samples themselves, show it.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;

@@ -30,9 +30,10 @@ pub struct KnownRotors {
 }
 
 impl KnownRotors {
-    /// Stretches of `flight`. They begin [`SETTLE_S`] after the first command and after each gap of the commands, and end
-    /// one period after the last command before a gap and before the end. In a log that writes commands only on change, the
-    /// last one holds, but not from one of its files to the next. Without commands, measured speeds are known wherever they were measured.
+    /// Stretches of `flight`. They begin [`SETTLE_S`] after the first command and after each gap of the
+    /// commands. They end one period after the last command before a gap or the end. In a log that writes
+    /// commands only on change, the last one holds, but not from one of its files to the next. Without
+    /// commands, measured speeds are known wherever they were measured.
     #[must_use]
     pub fn of(flight: &Flight) -> Self {
         let command = &flight.command;

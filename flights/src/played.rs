@@ -87,8 +87,9 @@ impl Played {
         }
     }
 
-    /// True if the window from `from_s` to `to_s` counts. These do not: windows in which the rotors are not known, that
-    /// touch a gap of a measured channel, or that end at the last samples of the log, where a derivative is one-sided.
+    /// True if the window from `from_s` to `to_s` counts. A window does not count if the rotors are not known
+    /// in it or it touches a gap of a measured channel. It does not count either if it ends at the last
+    /// samples of the log, where a derivative is one-sided.
     #[must_use]
     pub fn counts(&self, from_s: f64, to_s: f64) -> bool {
         let (first_s, last_s) = self.counted_s;

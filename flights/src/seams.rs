@@ -45,8 +45,8 @@ impl Seams {
     }
 }
 
-/// Leaves out the samples nearest to each of `breaks`, until the step over it is one that every reader of the channel takes
-/// for a gap. Returns their number.
+/// Leaves out the samples nearest to each of `breaks`, until every reader of the channel takes the step over
+/// it for a gap. Returns their number.
 pub fn widen(channel: &mut dyn AnyChannel, breaks: &[(f64, f64)]) -> usize {
     let times = channel.time_s().clone();
     let usual_s = [period_s(&times), held_period_s(&times)].into_iter().flatten().fold(0.0, f64::max);

@@ -67,8 +67,8 @@ impl FlightSet {
     /// no folders in which a pattern would find logs: it is a name as any other.
     ///
     /// # Errors
-    /// If a key or a name in a log is wrong, values contradict their units, a test flight holds samples that
-    /// parameters are fitted on, or `read` fails.
+    /// If a key or a name in a log is wrong, or values contradict their units. If a test flight holds samples
+    /// that parameters are fitted on, or `read` fails.
     pub fn parse(path: &Path, text: String, read: &ReadFile<'_>) -> Result<Self, FlightsError> {
         Self::read(path, text, read, Patterns::Literal)
     }

@@ -1,7 +1,8 @@
 //! Specific force and its substitutes in logs: accelerations, with or without gravity, along other axes. Angular velocities along other axes.
 //!
-//! With R the attitude, body to world, and g up the gravity in the world, the specific force in the body is
-//! f = R^T (a + g), where a is the acceleration in the world: R b where the log holds b along the axes of the body.
+//! R is the attitude, body to world. g is the gravity in the world, counted upwards. The specific force in
+//! the body is f = R^T (a + g) with the acceleration a in the world. If the log holds b along the axes of the
+//! body, a = R b.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use vehicles::gaps::GAP_PERIODS;

@@ -6,8 +6,8 @@
 
 use crate::flight::Channel;
 
-/// Values that differ by less than this part of the channel's spread are the same, and those that differ by less than the
-/// digits of one of the two: a copy may have fewer.
+/// Values that differ by less than this part of the channel's spread are the same. So are those that differ
+/// by less than the digits of one of the two: a copy may have fewer.
 const SAME: f64 = 1e-3;
 /// A vector that a channel has more often, as at rest, does not show when it was measured.
 const REPEATS_MAX: usize = 4;

@@ -1,7 +1,7 @@
 //! PX4's ULog (docs.px4.io, "ULog File Format"): the messages that were logged, by name and field.
 //!
-//! Read are formats (F), subscriptions (A), data (D), dropouts (O), sync messages (S) and the flags (B), which say where
-//! data was appended after a crash; the rest is skipped by its length.
+//! Formats (F), subscriptions (A), data (D), dropouts (O), sync messages (S) and flags (B) are read. The
+//! flags say where data was appended after a crash. The rest is skipped by its length.
 
 use std::ops::Range;
 

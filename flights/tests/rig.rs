@@ -6,8 +6,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 const GRAVITY_M_S2: f64 = 9.81;
 const STEP_S: f64 = 0.005;
 
-/// A vehicle that leans to and fro about `lean_rad` while it turns about the vertical, with its free acceleration and what its
-/// accelerometer reads in free flight.
+/// A vehicle that leans to and fro about `lean_rad` while it turns about the vertical. It has its free
+/// acceleration and the accelerometer's readings in free flight.
 struct Motion {
     attitudes: Vec<UnitQuaternion<f64>>,
     places: Vec<Vector3<f64>>,

@@ -148,7 +148,8 @@ fn axes_of_rates_are_no_kind_of_force_and_need_an_attitude() {
     said(&alone, "`holds`: expected an attitude at its times");
 }
 
-/// The rates of a gyroscope in forward, right and down follow an attitude with w first, too, but not as well as with their own signs.
+/// The rates of a gyroscope in forward, right and down follow an attitude with w first, too. But they follow
+/// it better with their own signs.
 #[test]
 fn a_gyroscope_in_another_frame_is_no_attitude_in_another_order() {
     let found = ALONG_X.findings(&with_rates("\"wx\", \"-wy\", \"-wz\"", ""));

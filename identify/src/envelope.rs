@@ -29,9 +29,10 @@ struct Seen {
     height_m: Vec<f64>,
 }
 
-/// The envelope of the judged `flights`, each with the width of the windows in which it was compared, in s, and whether its rates were judged: limits by the keys
-/// of `[envelope]` in a vehicle file, of what was measured. Values are within them in 99 % of the time. What is faster than one
-/// cycle in the widest window was not compared in every flight.
+/// The envelope of the judged `flights`: limits of the measured values, by the keys of `[envelope]` in a
+/// vehicle file. Each flight has the width in s of the windows in which it was compared, and true if its
+/// rates were judged. Values are within them in 99 % of the time. What is faster than one cycle in the widest
+/// window was not compared in every flight.
 pub fn of<'f>(flights: impl Iterator<Item = (&'f Flight, f64, bool)>) -> BTreeMap<&'static str, Reached> {
     let (mut seen, mut widest_s) = (Seen::default(), 0.0_f64);
     for (flight, window_s, has_judged_rates) in flights {

@@ -18,7 +18,8 @@ use std::ops::Range;
 const SEARCH_S: f64 = 160.0;
 /// Their parameters are refined by predictions of about so much of it, in s.
 const REFINED_S: f64 = 600.0;
-/// The clocks of a flight are aligned by about so much of it, in s, and predictions of a flight that is not for test are made in as much.
+/// Length of the part of a flight by which its clocks are aligned, in s. Predictions of a flight that is not
+/// for test are made in about as much.
 const FLIGHT_S: f64 = 300.0;
 /// Length of a piece of a flight, in s: many times as long as manoeuvres and disturbances remember themselves.
 const PIECE_S: f64 = 10.0;

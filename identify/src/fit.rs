@@ -213,8 +213,9 @@ impl<'f> Problem<'f> {
         costs
     }
 
-    /// The folds of a cross-validation of so many blocks, by their places: stretches of time. With winds of single flights among the `free` parameters
-    /// each fold is a stretch of every flight, since no other flight shows the wind of one.
+    /// The folds of a cross-validation of so many blocks, by their places: stretches of time. If winds of
+    /// single flights are among the `free` parameters, each fold is a stretch of every flight. No other
+    /// flight shows the wind of one.
     pub fn folds(&self, blocks: usize, free: &[usize]) -> Vec<Vec<usize>> {
         if free.iter().all(|at| self.model.parameters.all[*at].flight.is_none()) {
             let places: Vec<usize> = (0..blocks).collect();
@@ -231,8 +232,8 @@ impl<'f> Problem<'f> {
         folds
     }
 
-    /// The costs of the data that effects are chosen on, as the equations about a fit promise them with the parameters `dropped` at
-    /// their baselines and the others fitted to that.
+    /// The costs of the data that effects are chosen on, as the equations about a fit promise them. The
+    /// parameters `dropped` are at their baselines, and the others are fitted to that.
     pub fn promised_without(&self, fitted: &FitResult, dropped: &[usize]) -> Vec<f64> {
         let baseline = |at: &usize| self.model.parameters.all[*at].baseline - fitted.values[*at];
         let held: Vec<Option<f64>> =

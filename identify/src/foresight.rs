@@ -116,7 +116,8 @@ impl Foresight {
         places.any(|(horizon, at)| without.is_grown(self, horizon, at)) || self.is_better_than(without)
     }
 
-    /// True if the error of a quantity is greater than that `with` an effect by a part that matters, noticeably, or by a greater part beyond chance.
+    /// True if the error of a quantity is noticeably greater than that `with` an effect, by a part that
+    /// matters. True also if it is greater by a larger part, beyond chance.
     fn is_grown(&self, with: &Self, horizon: usize, at: usize) -> bool {
         let pairs = self.blocks(with, horizon, 3 * at..3 * at + 3);
         let [without, with] = root_means(&pairs);
@@ -145,8 +146,10 @@ impl Foresight {
         places.filter_map(of_place).collect()
     }
 
-    /// True if all errors together are smaller than `other`'s beyond chance, and by more than [`LEAST_GROWTH`], in the geometric mean over components,
-    /// horizons and blocks of time: half of an error counts as much where it is small, down to the noise of the sensors, as where it is great.
+    /// True if all errors together are smaller than `other`'s beyond chance, and by more than
+    /// [`LEAST_GROWTH`]. They are compared by the geometric mean over components, horizons and blocks of
+    /// time: half of an error counts as much where it is small, down to the noise of the sensors, as where it
+    /// is great.
     pub fn is_better_than(&self, other: &Self) -> bool {
         self.chance_against(other) < LEVEL
     }

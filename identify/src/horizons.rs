@@ -130,8 +130,9 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
     set.flights.par_iter().flat_map_iter(of_flight).collect()
 }
 
-/// Errors by channel: of the declared vehicle, the new one, persistence, and the new one with the flight's own trim, with the disturbance that was
-/// seen, with the measured attitude, and in the wind that was seen.
+/// Errors by channel: of the declared vehicle, of the new one, and of persistence. Four more are of the new
+/// one: with the flight's own trim, with the disturbance that was seen, with the measured attitude, and in
+/// the wind that was seen.
 fn changes(errors: &[Errors; 7], by_axis: &[[f64; 3]; 4]) -> BTreeMap<&'static str, Change> {
     let one = |(quantity, by_axis): (StateQuantity, &[f64; 3])| {
         let (channel, unit) = (quantity.name(), quantity.unit());

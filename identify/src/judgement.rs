@@ -136,8 +136,9 @@ fn is_stopped(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
     entry.stops_at(value) && beyond > by_chance.max(BEYOND_PART * entry.scale)
 }
 
-/// True if a parameter of an effect that was accepted before stops at a bound only beside this one: the two are nearly the same together
-/// (mass, thrust and inertia all greater by one part), and what drives them is an effect that neither is.
+/// True if a parameter of an effect that was accepted before stops at a bound only beside this one. Then the
+/// two are nearly the same together (mass, thrust and inertia all greater by one part). An effect that is
+/// neither of them drives both.
 fn drives_to_bound(problem: &Problem, base: &FitResult, candidate: &Candidate, fitted: &FitResult) -> bool {
     let others = fitted.free.iter().filter(|at| !candidate.free.contains(at));
     others.into_iter().any(|at| is_stopped(problem, fitted, *at) && !is_stopped(problem, base, *at))
@@ -166,8 +167,8 @@ fn is_determined(problem: &Problem, fitted: &FitResult, at: usize) -> bool {
     value - half > entry.spec().min || value + half < entry.max
 }
 
-/// The fit with each parameter held at its baseline that reached a limit of what is plausible, if the flights are explained as well without it and its
-/// effect has another parameter.
+/// The fit with parameters held at their baselines. A parameter is held if it reached a limit of what is
+/// plausible, and its effect has another parameter. The flights have to be explained as well without it.
 pub fn held_at_limits(problem: &Problem, mut fitted: FitResult) -> FitResult {
     let all = &problem.model.parameters.all;
     let is_reached = |at: &usize| all[*at].reached(fitted.values[*at]).is_some();

@@ -1,11 +1,12 @@
 //! The noise of an equation's residual: autoregressive, so that slow noise, and noise that windows share, is weighed
 //! correctly.
 //!
-//! A vehicle is flown by feedback: the controller answers a slow disturbance, so that command and disturbance are
-//! correlated, and least squares that takes the residual for white finds too little torque gain. The direct method is
-//! consistent with the right noise model only (Forssell and Ljung, Automatica 35, 1999; Ljung, System Identification,
-//! 2nd ed., section 13.4). So each component of each equation is whitened by an autoregressive model of its own
-//! residual, and what is compared, in fits and in judgements, are its innovations: generalised least squares.
+//! A vehicle is flown by feedback: the controller answers a slow disturbance, so that command and disturbance
+//! are correlated. Least squares that takes the residual for white then finds too little torque gain. The
+//! direct method is consistent with the right noise model only (Forssell and Ljung, Automatica 35, 1999;
+//! Ljung, System Identification, 2nd ed., section 13.4). So each component of each equation is whitened by an
+//! autoregressive model of its own residual. Fits and judgements compare its innovations: generalised least
+//! squares.
 
 /// Orders that are tried.
 const ORDER_MAX: usize = 16;

@@ -44,8 +44,8 @@ impl Found {
     }
 }
 
-/// The offset at which the squares are least, searched from `start_s` on, by the normal equations at an offset, of which it is the first
-/// parameter; `None` beyond `most_s`.
+/// The offset at which the squares are least, searched from `start_s` on by the normal equations at an
+/// offset. The offset is their first parameter. `None` beyond `most_s`.
 pub fn descended(
     start_s: f64,
     most_s: f64,

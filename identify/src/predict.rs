@@ -85,8 +85,8 @@ impl Measured {
         errors(flight, &self.ends(airframe, horizon_s, |_| Forecast::none()), |end| end.simulated)
     }
 
-    /// The ends of the windows of `horizon_s` that count, one window after the other, as `airframe` predicts them
-    /// under a push over each window, by the window's begin.
+    /// The predicted ends of the windows of `horizon_s` that count, one window after the other. `airframe`
+    /// predicts them under a `push` over each window, by the window's begin.
     pub fn ends(&self, airframe: Airframe, horizon_s: f64, push: impl Fn(f64) -> Forecast) -> Vec<WindowEnd> {
         self.ends_within(airframe, &[horizon_s], push).remove(0)
     }

@@ -283,8 +283,9 @@ impl Refinement<'_, '_> {
         })
     }
 
-    /// The values after the step that the equations `blocks` about some values ask for, beside what the equations of motion say, which are fulfilled
-    /// best at `start`. Those `dropped` go to their baselines; those that are not refined are as in `start`.
+    /// The values after the step that the equations `blocks` about some values ask for. The equations of
+    /// motion, which are fulfilled best at `start`, count beside them. Those `dropped` go to their baselines;
+    /// those that are not refined are as in `start`.
     fn stepped(
         &self,
         about: &Linearised,

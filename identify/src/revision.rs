@@ -209,8 +209,9 @@ struct Found<'s, 'f> {
 }
 
 impl Found<'_, '_> {
-    /// An accepted effect with a parameter that `fitted` left at a bound, or the one that is least beyond chance beside the others, if that is not at
-    /// `level`. Those `asked` for by predictions alone need not be.
+    /// An accepted effect with a parameter that `fitted` left at a bound. Else the effect that is least
+    /// beyond chance beside the others, if it misses `level`. Those `asked` for by predictions alone need not
+    /// be.
     fn unsound(&self, fitted: &FitResult, level: f64, asked: &[Candidate]) -> Option<Withdrawn> {
         let chance =
             |candidate: &Candidate| (candidate.kind.name, joint_p_value(self.problem, fitted, candidate));
@@ -322,9 +323,10 @@ impl Found<'_, '_> {
         Some(Revision::Instead(Box::new(found), old))
     }
 
-    /// The accepted effect that predictions are better without, of several the one with the greatest growth; or else those that they gain
-    /// nothing by: all, if they gain nothing by all of them `together` (predictions with these parameters at their baselines), and the one that they
-    /// gain least by if not. What such an effect takes is missing in the numbers of the others.
+    /// The accepted effect that predictions are better without, of several the one with the greatest growth.
+    /// Else the effects that they gain nothing by: all of them, if predictions gain nothing by all `together`
+    /// (predictions with these parameters at their baselines). Else the one of these that they gain least by.
+    /// The part that such an effect takes is missing in the numbers of the others.
     fn unworthy(
         &self,
         predictions: &Predictions,

@@ -47,8 +47,8 @@ const CONFIRMED: usize = 4;
 const AS_PROMISED: f64 = 0.5;
 /// More rounds than there are effects worth naming.
 const ROUNDS_MAX: usize = 12;
-/// Two that mask each other are looked for where this many times the cost is left that all candidates together
-/// would leave on the estimation data.
+/// Pairs that mask each other are tried if the cost that is left is large. It is so if it is this many times
+/// the cost that all candidates together would leave on the estimation data.
 const MUCH_LEFT: f64 = 1.5;
 /// Number of candidates that are tried as the first of two.
 const FIRSTS: usize = 4;

@@ -1,6 +1,6 @@
-//! Multi-step prediction: from every sample of a flight the model is set to the measured state and flown over the next samples,
-//! driven by the measured rotor speeds. Benchmarks of models of vehicles are stated in these errors (k-step-ahead predictions: Ljung, System
-//! Identification, 2nd ed., section 3.2).
+//! Multi-step prediction: at every sample of a flight the model is set to the measured state. It flies over
+//! the next samples, driven by the measured rotor speeds. Benchmarks of models of vehicles are stated in
+//! these errors (k-step-ahead predictions: Ljung, System Identification, 2nd ed., section 3.2).
 //!
 //! Other than the windows that an identification judges by, these overlap, and their errors are means of norms.
 

@@ -1,9 +1,10 @@
 //! Covariance of a residual: the noise of each component, and the trims of the flights.
 //!
 //! A flight's trim is a constant force and torque that it alone has: a propeller that was changed, a battery that was
-//! strapped on differently. It is a random effect, with a spread over flights that these themselves show, so that what all
-//! flights share is told from what each has of its own. Rows are freed of the part of their mean that the spread explains:
-//! quasi-demeaning (Fuller and Battese, J. Econometrics 2, 1974), of which nothing and the whole mean are the ends.
+//! strapped on differently. It is a random effect: the flights themselves show its spread. So the part that
+//! all flights share is separated from the part of each flight alone. Rows are freed of the part of their
+//! mean that the spread explains: quasi-demeaning (Fuller and Battese, J. Econometrics 2, 1974), of which
+//! nothing and the whole mean are the ends.
 //!
 //! A force that no effect explains acts at a lever and turns the vehicle too. The part of a torque residual that force residuals predict is
 //! subtracted first (`lever`).

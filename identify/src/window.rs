@@ -1,11 +1,11 @@
 //! The window through which measurement and model are both seen: a cubic B-spline.
 //!
-//! An equation of motion is compared in its weak form: both of its sides are averaged with the same smooth window w,
-//! and derivatives of measurements go over to the window, so that no measurement is differentiated by itself
-//! (integration by parts; the modulating functions of Shinbrot, Trans. ASME 79, 1957, in the B-spline form of
-//! Preisig and Rippin, Computers & Chemical Engineering 17(1), 1993). On the grid the window is four boxes folded
-//! with each other, and the differences below are exact: what a second difference takes of a position is the
-//! acceleration, averaged by the stencil 1/12, 10/12, 1/12 (Numerov), what a central difference takes of a rate is
+//! An equation of motion is compared in its weak form: both of its sides are averaged with the same smooth
+//! window w. Derivatives of measurements go over to the window, so that no measurement is differentiated by
+//! itself (integration by parts; the modulating functions of Shinbrot, Trans. ASME 79, 1957, in the B-spline
+//! form of Preisig and Rippin, Computers & Chemical Engineering 17(1), 1993). On the grid the window is four
+//! boxes folded with each other, and the differences below are exact. The second difference of a position is
+//! the acceleration, averaged by the stencil 1/12, 10/12, 1/12 (Numerov). The central difference of a rate is
 //! its derivative, averaged by 1/6, 4/6, 1/6 (Simpson). The model's side gets the same stencils.
 
 /// Weights of instants around a knot, which stands at the middle.

@@ -115,8 +115,8 @@ fn rotors_without_angular_momentum_are_named_and_hide_no_mass() {
     );
 }
 
-/// At a true rate of 5 % more than three of twenty would be seen once in sixty times, and more than two of eight, which quick tests
-/// take, once in 170 times; the seeds are fixed.
+/// At a true rate of 5 %, more than three of twenty would be seen once in sixty times. Quick tests take
+/// eight: more than two of them would be seen once in 170 times. The seeds are fixed.
 #[test]
 fn where_the_declared_vehicle_is_true_hardly_anything_is_named() {
     let named = |seed: u64| judged(Case::null(900 + seed, DURATION_S)).named;

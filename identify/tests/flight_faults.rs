@@ -532,9 +532,9 @@ fn a_role_without_a_sound_flight_is_refused_with_the_fault() {
     }
 }
 
-/// Real flights, where they are: none has a fault but three legs in which the estimate of position and velocity steps. That is
-/// real: the velocity changes by 0.2 to 0.26 m/s from one sample to the next, 10 ms later, the position by 5 to 9 cm with
-/// it, and the vehicle hovers meanwhile.
+/// Real flights, where they are: none has a fault but three legs in which the estimate of position and
+/// velocity steps. That is real: from one sample to the next, 10 ms later, the velocity changes by 0.2 to
+/// 0.26 m/s and the position by 5 to 9 cm. The vehicle hovers meanwhile.
 #[test]
 fn real_flights_have_no_faults_but_those_that_are_real() {
     if skipped::variable_or_skip("HUMMINGBUS_DATA", "the folder of measured flights").is_none() {

@@ -20,7 +20,8 @@ const READINGS_MAX: u32 = 5;
 /// ```
 ///
 /// # Errors
-/// If the file cannot be read, is written to meanwhile, or is a device or a pipe, which have no end that could be read to.
+/// If the file cannot be read or is written to meanwhile. If it is a device or a pipe, which has no end to
+/// read to.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     read_up_to(u64::MAX, path)
 }

@@ -2,10 +2,10 @@
 //!
 //! Signs. A rotor of spin s (+1 counter-clockwise from the tip of its axis a) and speed w turns at s w about a. The
 //! air's drag on it, c_Q w^2 against the rotation, reaches the body as -s c_Q w^2 about a (the yaw row of thesis
-//! eq. 3.10 has the opposite sign for the rotation of section 2.1). With h = sum s J_r w a the rotors' angular
-//! momentum relative to the body, Euler's equation for body and rotors together gives the body two more torques:
-//! -h' (spin-up reaction, which the thesis leaves out) and -w_B x h; with axes along z, h (-q, p, 0), which is thesis
-//! eq. 3.11.
+//! eq. 3.10 has the opposite sign for the rotation of section 2.1). The rotors' angular momentum relative to
+//! the body is h = sum s J_r w a. Euler's equation for body and rotors together gives the body two more
+//! torques: -h' (spin-up reaction, which the thesis leaves out) and -w_B x h; with axes along z, h (-q, p,
+//! 0), which is thesis eq. 3.11.
 
 use nalgebra::Vector3;
 use std::ops::AddAssign;

@@ -111,8 +111,8 @@ impl Places {
         self.current = None;
     }
 
-    /// True if the program still refers to the message that the step got. Fields of the array refer to the array, and other
-    /// arrays over its `base` refer to the view (numpy does not hold the buffer of it).
+    /// True if the program still refers to the message that the step got. Fields of the array refer to the
+    /// array. Other arrays over its `base` refer to the view (numpy does not hold the view's buffer).
     pub(crate) fn is_kept(&self, _: Python<'_>) -> bool {
         let Some(Place { view, array }) = self.current.map(|index| &self.places[index]) else { return false };
         // SAFETY: the objects live, and this thread is attached to the interpreter.

@@ -224,8 +224,8 @@ pub(crate) fn message_difference(x: &Record, y: &Record) -> Difference {
     Difference::Message { tick, topic, field: None, a: describe(x), b: describe(y) }
 }
 
-/// The difference that the next messages `x` of `a` and `y` of `b` make if one of them is on a topic that the other recording
-/// lacks.
+/// The difference of the next messages, `x` of `a` and `y` of `b`, if the topic of one is missing in the
+/// other recording.
 fn topic_difference(a: &Recording, b: &Recording, x: &Record, y: &Record) -> Option<Difference> {
     let (of_a, of_b) = ((x, a, b), (y, b, a));
     let by_time = if (x.tick, &x.topic) <= (y.tick, &y.topic) { [of_a, of_b] } else { [of_b, of_a] };

@@ -13,8 +13,8 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// The difference between a field of a shadow topic and the same field of the topic itself, over the ticks of one
-/// shadow that have both. Its text is a line of the summary.
+/// The difference between a field of a shadow topic and the same field of the topic itself. It covers the
+/// ticks of one shadow that have both. Its text is a line of the summary.
 ///
 /// ```
 /// use report::shadow::Difference;

@@ -150,8 +150,8 @@ impl Writer<'_> {
         Ok(Parts::written(self.run_dir, cause, tick, self.graph.plan.nodes.len())?)
     }
 
-    /// The checkpoint in `file`, or that of `tick` which this run has written, or the newest of it before tick `now`, to which
-    /// the run has come.
+    /// The checkpoint in `file`, or this run's checkpoint of `tick`, or its newest one before tick `now`. The
+    /// run has come to tick `now`.
     ///
     /// # Errors
     /// If there is none, it is one of another run, it lies ahead, or nothing can go on from it.

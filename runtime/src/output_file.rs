@@ -100,8 +100,8 @@ fn located(path: &Path) -> anyhow::Result<Location> {
 /// Refuses a file of `kind` at `path` if it would replace another kind of file.
 ///
 /// # Errors
-/// If its folder is missing, a link on the way cannot be trusted, or the file in its place is neither empty nor of
-/// this kind.
+/// If its folder is missing, or a link on the way cannot be trusted. If the file in its place is neither
+/// empty nor of this kind.
 pub fn check(path: &Path, kind: &Kind) -> Result<(), Error> {
     locate(path, kind)?;
     Ok(())

@@ -125,7 +125,7 @@ pub(crate) fn ball_inertia_m2(radius_m: f64) -> Matrix3<f64> {
 }
 
 /// The centre of the volume that closed triangles enclose, and the inertia for each kilogram about it. It is
-/// the sum over the tetrahedra between the first corner and each triangle, whose second moments are V/20 (Σ v
+/// the sum over the tetrahedra between the first corner and each triangle. Their second moments are V/20 (Σ v
 /// vᵀ + s sᵀ), with s = Σ v (F. Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2004).
 pub(crate) fn solid_moments(corners_m: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vector3<f64>, Matrix3<f64>) {
     let corner = |number: u32| Vector3::from(corners_m[number as usize]);

@@ -1,7 +1,7 @@
 //! Pressure and height in the standard atmosphere.
 //!
-//! Below 11 km the temperature falls linearly, and hydrostatic balance of an ideal gas gives
-//! p = p₀ (1 − L h / T₀)^(g M / (R L)) (ISO 2533:1975, "Standard Atmosphere", §2.7).
+//! Below 11 km the temperature falls linearly. Hydrostatic balance of an ideal gas then gives p = p₀ (1 − L h
+//! / T₀)^(g M / (R L)) (ISO 2533:1975, "Standard Atmosphere", §2.7).
 
 /// Pressure at sea level, Pa (ISO 2533).
 pub const SEA_LEVEL_PRESSURE_PA: f64 = 101_325.0;

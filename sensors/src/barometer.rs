@@ -1,9 +1,9 @@
 //! The barometer node: air pressure, and the height that follows from it.
 //!
 //! Reading = pressure at the centre of mass in the standard atmosphere (`crate::atmosphere`) + bias + white
-//! noise, in steps of the part's resolution and cut off at its range; the bias walks at random, as weather and
-//! temperature move it. The altitude follows from the reading and a reference pressure. `crate::channel` gives the
-//! times, delays and losses of measurements.
+//! noise. It has steps of the part's resolution and is cut off at its range. The bias walks at random, as
+//! weather and temperature move it. The altitude follows from the reading and a reference pressure.
+//! `crate::channel` gives the times, delays and losses of measurements.
 
 use crate::atmosphere::{SEA_LEVEL_PRESSURE_PA, height_m, pressure_Pa};
 use crate::channel::Chance;

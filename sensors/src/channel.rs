@@ -68,8 +68,9 @@ impl Timing {
         ParameterError::both(delay, mean).map(drop)
     }
 
-    /// The longest period of a node, in ticks of `tick_ns`, at which measurements are made and arrive at the very ticks at which they
-    /// would with a period of one tick; that is one tick where interval or delay are no whole number of ticks.
+    /// The longest period of a node, in ticks of `tick_ns`, that does not change the ticks of measurements
+    /// and arrivals. They are then the same as with a period of one tick. If interval or delay are no whole
+    /// number of ticks, the period is one tick.
     #[must_use]
     pub(crate) fn period_ticks(&self, tick_ns: u64) -> u32 {
         let whole = |ticks: f64| {

@@ -12,9 +12,9 @@
 //! rotors' thrust along body z, so it reads "level" at any attitude. A roll of 10° held for 1 s would be
 //! estimated as about 0°, and a controller would roll on. In time t the part t/τ of the angle leaks away. The
 //! gyroscope's noise density n adds n·√(τ/2), and its bias b adds b·τ. The default, τ = 30 s, loses 0.33° of
-//! 10° in 1 s and adds 0.04° of noise with the default IMU. No value of τ cures the cause: a controller that
-//! holds the estimate at zero lets the truth drift at the bias b for as long as nothing but thrust acts on the
-//! accelerometer. Drag makes tilt visible again, with its own delay.
+//! 10° in 1 s and adds 0.04° of noise with the default IMU. No value of τ cures the cause. As long as only
+//! thrust acts on the accelerometer, a controller that holds the estimate at zero lets the truth drift at the
+//! bias b. Drag makes tilt visible again, with its own delay.
 //!
 //! *Rates.* The gyroscope gives body rates p, q, r; the angles' own rates follow from them by eq. 3.18,
 //! singular at ±90° of pitch. A unit quaternion is propagated instead, which is the same to first order

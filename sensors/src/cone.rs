@@ -88,8 +88,8 @@ impl Cone {
         Self { axis_B: *axis_B, half_angle_rad, rays_B }
     }
 
-    /// Returns the distance from `from_W_m`, with the body at `attitude_WB`, to the nearest thing of the scene in the
-    /// cone, if it is at most `reach_m`. The scene's free bodies are at `bodies`.
+    /// Returns the distance from `from_W_m` to the nearest object of the scene in the cone, if it is at most
+    /// `reach_m`. The body is at `attitude_WB`. The scene's free bodies are at `bodies`.
     pub fn scene_distance_m(
         &self,
         (scene, bodies): (&RayCaster, &[BodyPose]),

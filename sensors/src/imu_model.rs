@@ -15,12 +15,12 @@ use nalgebra::Vector3;
 
 /// Parameters of an IMU; the defaults are an Analog Devices ADIS16448.
 ///
-/// The noise densities and bias walks are those that the EuRoC micro aerial vehicle data set gives for
-/// its ADIS16448 (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file
-/// `imu0/sensor.yaml`); no data sheet of a part of this class gives a bias walk. The ranges are the
-/// data sheet's (±18 g, ±1000 °/s). The thesis does not name the part on the Hummingbird, so none of
-/// these is its own. The initial biases are zero: an autopilot nulls them at rest before take-off. Readings are neither
-/// delayed nor lost: the autopilot reads the part over a wire of a few centimetres.
+/// The noise densities and bias walks are those of the ADIS16448 in the EuRoC micro aerial vehicle data set.
+/// Source: Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016, file `imu0/sensor.yaml`. No
+/// data sheet of a part of this class gives a bias walk. The ranges are the data sheet's (±18 g, ±1000 °/s).
+/// The thesis does not name the part on the Hummingbird, so none of these is its own. The initial biases are
+/// zero: an autopilot nulls them at rest before take-off. Readings are neither delayed nor lost: the
+/// autopilot reads the part over a wire of a few centimetres.
 #[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
 #[parameters(default)]
 pub struct ImuParams {

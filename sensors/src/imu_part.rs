@@ -126,8 +126,9 @@ impl ImuPart {
         ImuReading { specific_force_B_m_s2: motion.specific_force_B_m_s2 + more_B_m_s2, ..*motion }
     }
 
-    /// Rotors turn in turns one way and the other. Each rotor's unbalance shakes the part in a circle in the plane of the rotors, once a turn, and its two blades
-    /// along the axis, twice: with an amplitude d the acceleration is d Ω², and of an angle φ the rate φ Ω.
+    /// Rotors turn in turns one way and the other. Each rotor's unbalance shakes the part in a circle in the
+    /// plane of the rotors, once a turn. Its two blades shake it along the axis, twice a turn. With an
+    /// amplitude d the acceleration is d Ω², and of an angle φ the rate φ Ω.
     fn shaken(&self, state: &mut ImuPartState, truth: &ImuMotion, motion: &ImuReading) -> ImuReading {
         let mut shaken = *motion;
         if state.readings == 0 {

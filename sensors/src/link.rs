@@ -30,8 +30,8 @@ const BAUD: f64 = 57_600.0;
 /// 8 data bits, a start bit and a stop bit, no parity (thesis §2.2).
 const BITS_PER_BYTE: u32 = 10;
 /// Overhead of AscTec's serial protocol for a message: `>*>`, two bytes of length, one of type, two of
-/// checksum, `<#<` (`ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and Michael,
-/// University of Pennsylvania).
+/// checksum, `<#<`. Source: `ASCTEC_PACKET_OVERHEAD_BYTES` of the `asctec` driver for ROS by Kushleyev and
+/// Michael, University of Pennsylvania.
 const OVERHEAD_BYTES: u32 = 11;
 /// Serial input buffer of an XBee of the 802.15.4 series (Digi, "XBee/XBee-PRO RF Modules 802.15.4 Product
 /// Manual", "DI buffer").

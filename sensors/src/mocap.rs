@@ -16,11 +16,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 timed_parameters! {
     /// Parameters of motion capture; the defaults are a Vicon system of MX cameras.
     ///
-    /// *Position*: Merriaux et al., "A study of Vicon system positioning performance" (Sensors 17(7), 2017), find a
-    /// mean error of 0.15 mm at rest and below 2 mm in motion; 0.5 mm lies between. *Attitude*: 0.5 mm seen on
-    /// markers 0.3 m apart is about 0.1°. *Rate and delay*: such systems stream at 100 Hz and more; 10 ms are one
-    /// frame of exposure and solving, as the network adds little (tuned, no source). Losses are off: they depend on
-    /// the room.
+    /// *Position*: Merriaux et al. find a mean error of 0.15 mm at rest and below 2 mm in motion ("A study of
+    /// Vicon system positioning performance", Sensors 17(7), 2017); 0.5 mm lies between. *Attitude*: 0.5 mm
+    /// seen on markers 0.3 m apart is about 0.1°. *Rate and delay*: such systems stream at 100 Hz and more;
+    /// 10 ms are one frame of exposure and solving, as the network adds little (tuned, no source). Losses are
+    /// off: they depend on the room.
     ///
     /// ```
     /// use bus::messages::PlantState;

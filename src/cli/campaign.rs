@@ -354,8 +354,9 @@ fn jobs(campaign: &Campaign, base: &Base, plan: &Plan, flown: &BTreeMap<u64, Row
         .collect()
 }
 
-/// Refuses a campaign of which flights that are spread over the whole plan are all refused, as they are where no manifest has a
-/// varied key, and one with a text or truth value that is refused in each flight, as a misspelt one is.
+/// Refuses a campaign if flights that are spread over its whole plan are all refused: for example, if no
+/// manifest has a varied key. Refuses it also if a text or truth value is refused in each flight, as a
+/// misspelt one is.
 fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> {
     let all = plan.flights.len();
     if let Some((flight, error)) = refusal(campaign, base, plan, spread(all))? {

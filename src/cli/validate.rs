@@ -40,9 +40,9 @@ pub struct ValidateArguments {
     /// With --steps-ahead: rotors keep the speed of the last sample until the next; without it they follow straight lines between samples.
     #[arg(long, requires = "steps_ahead")]
     held: bool,
-    /// Instead of flying on the bus, print the specific force (m/s²) and the angular acceleration (rad/s²) that each vehicle predicts at every
-    /// sample of the attitude, from the measured state and rotor speeds. Rotor speeds that were not logged follow from the commands.
-    /// Needs --json.
+    /// Instead of flying on the bus, print the specific force (m/s²) and the angular acceleration (rad/s²)
+    /// that each vehicle predicts. Predictions are made at every sample of the attitude, from the measured
+    /// state and rotor speeds. Rotor speeds that were not logged follow from the commands. Needs --json.
     #[arg(long, requires = "json", conflicts_with_all = ["keep", "steps_ahead"])]
     accelerations: bool,
 }

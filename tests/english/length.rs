@@ -12,7 +12,7 @@ const WORDS_MAX: usize = 25;
 const IN_PAGES: usize = 8;
 
 /// The same in doc comments.
-const IN_DOC_COMMENTS: usize = 96;
+const IN_DOC_COMMENTS: usize = 0;
 
 /// Returns the doc comments of a Rust file, each in the line that it has there.
 fn doc_comments(text: &str) -> String {

@@ -341,8 +341,8 @@ fn a_browser_follows_a_live_run_to_its_end() {
     assert_eq!((&seen["later"]["isPlaying"], &seen["last"]["isKnown"]), (&json!(true), &json!(true)));
 }
 
-/// A vehicle with its first message after the opening of the page is shown like the others, also if the first question
-/// for it gets no answer.
+/// A vehicle whose first message comes after the opening of the page is shown like the others. This holds
+/// also if the first question for it gets no answer.
 #[test]
 fn a_browser_shows_a_vehicle_that_comes_late() {
     let Some(readers) = readers() else { return };

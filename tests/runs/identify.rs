@@ -42,8 +42,8 @@ fn require_bus_agrees(report: &Value) {
     assert!(furthest < 0.01, "{furthest}: {}", bus["furthest_at"]);
 }
 
-/// The log ends where windows end: a velocity that is derived from noisy positions has samples to one side only there, and
-/// a flight of 6 s has five windows of a second, and one of 3 s, which quick tests take, has two.
+/// The log ends where windows end. There, a velocity that is derived from noisy positions has samples to one
+/// side only. A flight of 6 s has five windows of a second. One of 3 s, which quick tests take, has two.
 #[test]
 fn the_bus_agrees_with_the_report_up_to_the_last_sample() {
     let place = Place::new();

@@ -25,8 +25,9 @@ pub fn shipped() -> Vec<String> {
     paths
 }
 
-/// Manifests that have a node of every kind and every physics backend. They have meshes, free bodies, joints and ropes, a rig, a
-/// radio link, a node of another program, steps that take time, each way to replace a node, and many vehicles.
+/// Manifests that have a node of every kind and every physics backend. They have meshes, free bodies, joints
+/// and ropes, a rig and a radio link. They also have a node of another program, steps that take time, each
+/// way to replace a node, and many vehicles.
 const REPRESENTATIVE: [&str; 24] = [
     "by-hand",
     "commands-over-a-link",

@@ -1,5 +1,6 @@
-//! The same bytes on another processor: the shipped manifests are flown once more as if the processor had no fused
-//! products, for which the C library has other versions of its functions; and no node calls any of those functions.
+//! The same bytes on another processor. The shipped manifests are flown once more as if the processor had no
+//! fused products. For fused products the C library has other versions of its functions; no node calls any of
+//! these.
 
 use crate::manifests::{is_brief, settings, shipped};
 use crate::recordings::open;
@@ -35,9 +36,9 @@ const ALIKE: [&str; 7] = [
     "rig-b",
 ];
 
-/// Functions of the C library that a node may call, with the end of its name, since they change nothing: the number of
-/// halvings in nalgebra's matrix exponential, a count in parry's tree of boxes, and normals of a mesh's corners, which no contact reads
-/// (docs/decisions/009-numbers.md).
+/// Functions of the C library that a node may call, with the end of its name, since they change nothing. They
+/// compute the number of halvings in nalgebra's matrix exponential, and a count in parry's tree of boxes.
+/// They also compute normals of a mesh's corners, which no contact reads (docs/decisions/009-numbers.md).
 const ALLOWED: [(&str, &str); 3] = [("log2", "controller"), ("log2", "plant"), ("acos", "plant")];
 
 /// Names the file to which the witness, `c_library.c`, writes the functions that are called.

@@ -1,8 +1,9 @@
 //! Quotation marks in CSV files of measurements, whose rows are lines.
 //!
-//! CSV lets a cell in quotation marks go on over line ends and delimiters. So a single stray mark makes one cell of all
-//! rows up to the next mark or the end of the file, and a reader finds nothing wrong. No logger writes a cell of several
-//! lines: a cell that begins with a mark has to end with one, on its line. The crate `csv` takes any such cell.
+//! CSV lets a cell in quotation marks go on over line ends and delimiters. So a single stray mark joins all
+//! rows up to the next mark or the end of the file to one cell. A reader then finds no fault. No logger
+//! writes a cell of several lines: a cell that begins with a mark has to end with one, on its line. The crate
+//! `csv` takes any such cell.
 
 use crate::lines;
 

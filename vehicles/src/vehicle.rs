@@ -111,8 +111,8 @@ impl Vehicle {
         if has_failed { 0.0 } else { self.command.speed(command) }
     }
 
-    /// Thrust along z of the body, in N, of rotors that have settled at `commands` by `map`, a map of commands in place of the
-    /// vehicle's own.
+    /// Thrust along z of the body, in N, of rotors that have settled at `commands`. The map of commands is
+    /// `map` in place of the vehicle's own.
     pub fn static_thrust_by(&self, map: &CommandMap, commands: &[f64; ROTORS_MAX]) -> f64 {
         let working = self.rotors.iter().zip(commands).filter(|(rotor, _)| !rotor.has_failed);
         let squares = working.map(|(rotor, command)| rotor.axis.z * map.speed(*command).powi(2));

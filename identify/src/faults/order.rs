@@ -36,8 +36,8 @@ const MORE_OF_LITTLE: f64 = 0.2;
 const LEFT: f64 = 1.0 / 3.0;
 /// Least mean share, and least mean gain, of another order over all flights that explains [`TIMES`] as much as the declared one; axes that
 /// turn against the commands are taken off. Noise and disturbances may leave little of the angular accelerations to the commands: a tenth on real
-/// logs of a Crazyflie at 100 Hz. There an exchange of two opposite motors leaves the declared order 56 % of what the right one explains, in the
-/// yaw that it does not change.
+/// logs of a Crazyflie at 100 Hz. There an exchange of two opposite motors does not change the yaw: the
+/// declared order still explains 56 % of what the right one explains.
 const MORE_IN_ALL: f64 = 0.1;
 const TIMES: f64 = 1.7;
 /// Least gain of spins that other flights of the same vehicle show.

@@ -39,9 +39,9 @@ pub struct Coefficient {
 }
 
 impl Coefficient {
-    /// Least squares over plateaus, each one vote; `None` with too few. Intervals by leaving out one plateau after
-    /// the other, since readings of one plateau are correlated, and by the standard error of each log's tare, in
-    /// `tare_sigmas`, which all of its plateaus share.
+    /// Least squares over plateaus, each one vote; `None` with too few. Intervals come from leaving out one
+    /// plateau after the other, since readings of one plateau are correlated. They include the standard error
+    /// of each log's tare, in `tare_sigmas`, which all of its plateaus share.
     pub fn fitted(fit: &[Point], test: &[Point], tare_sigmas: &[f64]) -> Option<Self> {
         let speed = |point: &&Point| point.squared;
         let ratio = |point: &Point| point.force / point.squared;

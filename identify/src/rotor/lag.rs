@@ -3,9 +3,10 @@
 //! A step is modelled as w(t) = w0 + dw s(t - d), with s the motor's unit step. The levels w0 and dw and the onset d
 //! belong to the step: a log tells when a command took effect only to one row. So they are fitted to every step, for
 //! every motor alike, and projected out of the motor's own equations (variable projection: Golub and Pereyra, SIAM
-//! J. Numer. Anal. 10, 1973). Residuals are relative to the step's height, so that every step counts the same. The
-//! few motor parameters are found by Levenberg-Marquardt; their intervals come from leaving out one step after the
-//! other, whose normal equations are taken out of the sum (one Gauss-Newton step, no fit anew).
+//! J. Numer. Anal. 10, 1973). Residuals are relative to the step's height, so that every step counts the
+//! same. The few motor parameters are found by Levenberg-Marquardt. Their intervals come from leaving out one
+//! step after the other. The normal equations of a step are taken out of the sum (one Gauss-Newton step, no
+//! fit anew).
 
 use nalgebra::{Matrix2, Vector2};
 

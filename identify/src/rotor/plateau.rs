@@ -104,9 +104,9 @@ pub fn spread(values: &[f64]) -> f64 {
     MAD_TO_SIGMA * median(&deviations)
 }
 
-/// The standard error of the median of readings that may remember each other: that of normal numbers, of which as many count
-/// as the autocorrelation leaves independent, summed up to where it cannot be told from 0 (Bartlett 1946; Sokal, "Monte Carlo
-/// methods in statistical mechanics", 1997, section 3).
+/// The standard error of the median of correlated readings. It is that of as many normal numbers as the
+/// autocorrelation leaves independent. The autocorrelation is summed up to where it cannot be distinguished
+/// from 0 (Bartlett 1946; Sokal, "Monte Carlo methods in statistical mechanics", 1997, section 3).
 pub fn median_error(values: &[f64]) -> f64 {
     let (n, scatter) = (values.len(), spread(values));
     if scatter <= 0.0 || n < 2 {
@@ -134,8 +134,8 @@ pub fn stuck_finding(log: &str, speed: &[f64]) -> Option<String> {
     })
 }
 
-/// Counts the readings in runs of at least `shortest` equal ones while the rotor turns, and those among them
-/// that equal the largest reading of all.
+/// Counts the readings in runs of at least `shortest` equal ones while the rotor turns. Counts those among
+/// them that equal the largest reading of all.
 fn stuck(values: &[f64], shortest: usize) -> (usize, usize) {
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let runs = values.chunk_by(|a, b| a == b).filter(|run| run.len() >= shortest && run[0] > REST_RAD_S);

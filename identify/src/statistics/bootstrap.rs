@@ -31,10 +31,10 @@ pub struct MeanInterval {
 
 /// The mean of `values` with its percentile interval under the circular block bootstrap.
 ///
-/// Blocks that start anywhere, and go on at the start where the samples end, are strung together to a series of the
-/// same length: Politis and Romano, "A circular block-resampling procedure for stationary data" (1992), after
-/// Künsch, "The jackknife and the bootstrap for general stationary observations", Annals of Statistics 17 (1989).
-/// NaN where there are no samples.
+/// Blocks that start anywhere, and go on at the start where the samples end, are strung together to a series
+/// of the same length. The method is that of Politis and Romano, "A circular block-resampling procedure for
+/// stationary data" (1992). It follows Künsch, "The jackknife and the bootstrap for general stationary
+/// observations", Annals of Statistics 17 (1989). NaN where there are no samples.
 ///
 /// ```
 /// use identify::statistics::{Bootstrap, block_bootstrap_mean};

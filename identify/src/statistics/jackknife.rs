@@ -34,10 +34,10 @@ impl Estimate {
 /// The interval of `value` from the estimates that each leave out one of G blocks.
 ///
 /// sigma^2 = (G - 1) / G sum_g (value_g - value)^2, the interval by Student's t with G - 1 degrees of freedom: the
-/// delete-a-block jackknife (Künsch 1989). Samples within a block may be correlated as they like; for least squares
-/// it is the cluster-robust covariance CV3, the one of its kind that stays honest with few blocks of unequal weight
-/// (MacKinnon, Nielsen and Webb, "Cluster-robust inference: a guide to empirical practice", J. Econometrics 2023).
-/// Infinite with fewer than two blocks.
+/// delete-a-block jackknife (Künsch 1989). Samples within a block may be correlated as they like; for least
+/// squares it is the cluster-robust covariance CV3. Among its kind, CV3 stays honest with few blocks of
+/// unequal weight (MacKinnon, Nielsen and Webb, "Cluster-robust inference: a guide to empirical practice", J.
+/// Econometrics 2023). Infinite with fewer than two blocks.
 ///
 /// ```
 /// use identify::statistics::jackknife;

@@ -66,8 +66,8 @@ impl Corner {
     }
 }
 
-/// Passes to `tell` the corners of two solids, one of which has a large face, that are within `margin_m` and not among the points
-/// of `manifolds`.
+/// Passes corners of two solids, one of which has a large face, to `tell`. These are the corners within
+/// `margin_m` that are not among the points of `manifolds`.
 pub(super) fn missing(
     thing: (&Collider, &Pose),
     part: (&Collider, &Pose),

@@ -30,8 +30,8 @@ impl Drive {
         Self { told: told.clone(), turns_round }
     }
 
-    /// Force on the child, N or N m, at this time, where the joint is at `position` (m or rad) and moves at `rate` (m/s or
-    /// rad/s).
+    /// Force on the child, N or N m, at this time. The joint is at `position` (m or rad) and moves at `rate`
+    /// (m/s or rad/s).
     pub(super) fn force(&self, when: &Instant, position: f64, rate: f64) -> f64 {
         let target = self.told.target_of_step(when.time_s, when.middle_s);
         let Target { position: wanted, rate: wanted_rate } = target;

@@ -1,7 +1,8 @@
 //! The impulses of all joints at once: those that change the rates of their rows to the wanted ones.
 //!
-//! With the Jacobian J of all rows and the bodies' mobility W they are the solution of (J W Jᵀ) λ = wanted, whose matrix is
-//! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the same way.
+//! With the Jacobian J of all rows and the bodies' mobility W they solve (J W Jᵀ) λ = wanted. The matrix is
+//! symmetric and positive semidefinite. Forces over accelerations, and shifts over distances, are found the
+//! same way.
 use super::body::lay_out;
 use super::cholesky::{factorise, substitute};
 use super::drive::{Drive, Instant};
@@ -119,9 +120,9 @@ impl JointForces {
         }
     }
 
-    /// The joint whose damping and drive are the fastest against the inertia of the bodies that they move, and
-    /// a bound of the rate of the fastest pole, 1/s. The bodies count as free, which they are not where other
-    /// joints hold them.
+    /// The joint with the fastest pole, and a bound of the rate of this pole, 1/s. The pole is that of
+    /// damping and drive against the inertia of the bodies that they move. The bodies count as free, which
+    /// they are not where other joints hold them.
     pub(super) fn fastest_pole(&mut self, joints: &[Joint]) -> Option<(usize, f64)> {
         let mut springs = Vec::new();
         for (number, joint) in joints.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! Joints between free bodies, the vehicle and the world: the rows of their constraints.
 //!
-//! A joint with its anchors p on both, and a direction d that turns with the parent, holds d · (p_child - p_parent) at 0,
-//! or the child's rotation about d. A row's Jacobian maps the twists of the two to the rate of that. Its bias
-//! is the part of the second derivative that does not depend on accelerations (R. Featherstone, Rigid Body
-//! Dynamics Algorithms, 2008, section 8.2).
+//! A joint has an anchor p on each body, and a direction d that turns with the parent. It holds
+//! d · (p_child - p_parent) at 0, or the child's rotation about d. A row's Jacobian maps the twists of the two
+//! to the rate of that. Its bias is the part of the second derivative that does not depend on accelerations
+//! (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.2).
 
 use super::drive::Drive;
 use super::solver::{Body, Row, Unilateral, join, stop};

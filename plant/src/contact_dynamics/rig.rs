@@ -2,9 +2,9 @@
 //!
 //! The slider only moves up and down, and sideways where the rig sways: level within a square, as the lower end of a
 //! long tube does for small angles, without friction or a restoring force. The mass that hangs with the bearing is
-//! lumped in its centre. A ball joint ties the vehicle's mount to it and leaves all three rotations free. So the slider
-//! has no state of its own: it is where the mount is, and its mass is one that the mount carries along the axes that
-//! are free, and that holds it along the others.
+//! lumped in its centre. A ball joint ties the vehicle's mount to it and leaves all three rotations free. So
+//! the slider has no state of its own: it is where the mount is. The mount carries its mass along the free
+//! axes. Along the others the slider holds the mount.
 //!
 //! The tilt limit is a cone, as of a rod end, and the same at any yaw: a limit on Euler angles would not be. All
 //! stops are inelastic: a rope, a rod end's collar, a tube in a tube.
@@ -27,9 +27,9 @@ fn freedom(rig: &Rig) -> Vector3<f64> {
     Vector3::new(aside, aside, up)
 }
 
-/// Takes `rates` of free flight at `state` to those in the rig, by the force P of the bearing on the vehicle at its
-/// mount, at r from the centre of mass: the mount accelerates at a + α × r + ω × (ω × r), which is zero along an axis
-/// where the slider is held, and P is what moves and carries the slider along the others.
+/// Takes `rates` of free flight at `state` to those in the rig. The force P of the bearing acts on the
+/// vehicle at its mount, at r from the centre of mass. The mount accelerates at a + α × r + ω × (ω × r). This
+/// is zero along an axis where the slider is held. Along the others, P moves and carries the slider.
 pub(super) fn hold(rig: &Rig, model: &NewtonEuler, state: &State, rates: Rates) -> Rates {
     let vehicle = model.vehicle();
     // Within a step the quaternion is not kept at length 1.
@@ -82,8 +82,9 @@ impl<'a> Mounted<'a> {
         Self { rig, mount, free }
     }
 
-    /// The mobility in the rig: the mobility in free flight, reduced by the slider's mass and its guides (the
-    /// Sherman-Morrison-Woodbury formula, with the inverse mass that the slider adds along each axis: 0 where it is held).
+    /// The mobility in the rig: the mobility in free flight, reduced by the slider's mass and its guides.
+    /// Computed by the Sherman-Morrison-Woodbury formula, with the inverse mass that the slider adds along
+    /// each axis: 0 where it is held.
     pub(super) fn mobility(&self) -> Matrix6<f64> {
         let added = Matrix3::from_diagonal(&(freedom(self.rig) / self.rig.moving_mass_kg));
         let answer = self.free * self.mount.transpose();

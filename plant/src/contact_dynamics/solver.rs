@@ -2,11 +2,12 @@
 //!
 //! Moreau's time stepping, at the level of velocities (J. J. Moreau, Unilateral contact and dry friction in finite
 //! freedom dynamics, 1988): a constraint pushes only as far as its rate would otherwise be below its bound
-//! (Signorini's condition), and friction pushes against the slip, at most μ times as hard as the normal (Coulomb's
-//! law). Found by projected Gauss-Seidel iteration over the constraints, until nothing changes any more. It relaxes the
-//! normal of a contact and then its friction, which is quick, but goes to and fro where friction is about 1 and the arm
-//! couples the two. Where that does not settle, each contact's own problem of three impulses is solved as a
-//! whole, stick or slip (block Gauss-Seidel: M. Jean, The non-smooth contact dynamics method, 1999).
+//! (Signorini's condition). Friction pushes against the slip, at most μ times as hard as the normal
+//! (Coulomb's law). Found by projected Gauss-Seidel iteration over the constraints, until nothing changes any
+//! more. It relaxes the normal of a contact and then its friction. This is quick, but goes to and fro where
+//! friction is about 1 and the arm couples the two. Where that does not settle, each contact's own problem of
+//! three impulses is solved as a whole, stick or slip (block Gauss-Seidel: M. Jean, The non-smooth contact
+//! dynamics method, 1999).
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 

@@ -202,8 +202,8 @@ impl World {
         }
     }
 
-    /// The same for points where free bodies, at `states`, may touch each other, the vehicle at `vehicle`, or
-    /// still things, after the points that are `found` already.
+    /// The same for points where free bodies may touch each other, the vehicle or still things. The bodies
+    /// are at `states`, the vehicle at `vehicle`. The points follow those that are `found` already.
     pub(super) fn find_near_bodies(
         &mut self,
         vehicle: &RigidBody,
@@ -352,9 +352,9 @@ fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near
     }
 }
 
-/// Drops points that are deep between two shapes that only touch. Where a corner of a triangle is touched, parry may turn the normal
-/// to the triangle's face, along which the part may reach far beyond it. Where two equal prisms stand on each other, it may take the
-/// normal of a side that both share.
+/// Drops points that are deep between two shapes that only touch. Where a corner of a triangle is touched,
+/// parry may turn the normal to the triangle's face. Along that normal the part may reach far beyond it.
+/// Where two equal prisms stand on each other, it may take the normal of a side that both share.
 fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifolds: &mut [Manifold]) {
     let shape = thing.0.shape();
     // Round shapes are told rightly, and to ask again takes time and memory.

@@ -8,8 +8,8 @@ use vehicles::{EffectEntry, Stated, Vehicle};
 /// The effects of `entries`, in their order.
 ///
 /// # Errors
-/// An effect or parameter that the catalogue does not have, a unit of another dimension, a value out of bounds, a
-/// parameter that is missing, or an effect that stands twice; all of these faults.
+/// An effect or parameter that the catalogue does not have. A unit of another dimension, a value out of
+/// bounds, a missing parameter, or an effect that stands twice. The error has all of these faults.
 pub fn resolve<'e>(entries: impl IntoIterator<Item = &'e EffectEntry>) -> Result<Vec<Effect>, Diagnostic> {
     let (mut faults, mut kinds) = (Faults::default(), Vec::new());
     let mut effects: Vec<Effect> = Vec::new();

@@ -10,8 +10,9 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use vehicles::Vehicle;
 
-/// Accelerations that each of `vehicles`, with the effects of its file, predicts at the samples of the `flights`: by flight its role and, under `vehicles`,
-/// the times in s, the specific forces in m/s² and the angular accelerations in rad/s², along and about the axes of the body.
+/// Accelerations that each of `vehicles`, with the effects of its file, predicts at the samples of the
+/// `flights`. Each flight has its role. Under `vehicles` it has the times in s, the specific forces in m/s²
+/// and the angular accelerations in rad/s². Both are in the axes of the body.
 ///
 /// # Errors
 /// A vehicle file that cannot be read, a flight without an attitude, a flight with neither rotor speeds nor commands.

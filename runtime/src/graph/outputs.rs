@@ -213,8 +213,8 @@ fn setting<'a>(process: &'a Process, port: &str) -> Option<Stated<'a>> {
     process.outputs.iter().find(|(name, _)| name.get_ref() == port)
 }
 
-/// The topic of the output `port` of a node that computes every `period` ticks and has something new at `ticks`, and the place that
-/// says so.
+/// The topic of the output `port` of a node, and the place that declares it. The node computes every `period`
+/// ticks and has something new at `ticks`.
 fn topic(
     manifest: &Manifest,
     node: &Spanned<String>,

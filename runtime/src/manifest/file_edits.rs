@@ -34,8 +34,9 @@ pub struct FileEdit {
     span: Range<usize>,
 }
 
-/// The process, the key of the file, and the keys in it, where `keys` lead into a file that is TOML to a component of `registry`. The kind
-/// of the process is not known yet: [`all`] refuses one that does not declare the file as TOML.
+/// The process, the key of the file, and the keys in it. `None` unless `keys` lead into a file that is TOML
+/// to a component of `registry`. The kind of the process is not known yet: [`all`] refuses one that does not
+/// declare the file as TOML.
 pub fn split<'k, 's>(keys: &'k [&'s str], registry: Registry) -> Option<(&'s str, &'s str, &'k [&'s str])> {
     let ["process", process, file, rest @ ..] = keys else { return None };
     let is_file = Process::file_keys().any(|key| key == *file);

@@ -1,12 +1,12 @@
 //! The extended Kalman filter: motion and sensor errors from an IMU and any other sensors.
 //!
 //! *Two times.* Measurements arrive late, and not in the order in which they were measured. The filter proper
-//! therefore stays at the time up to which nothing can arrive any more, and uses every measurement at its own
-//! time, in order. It publishes its motion and its covariance, carried on to the present with the readings since.
-//! Using a measurement at its own time is exact, where correcting the present by an old innovation is not. It is
-//! also cheap: readings are integrated twice, and a covariance is carried once for each measurement. The price is
-//! that a fast sensor waits for the slow ones' delay. Meanwhile the present drifts by the IMU's noise: with the
-//! default IMU and 200 ms, by 1 mm/s and 0.005°.
+//! therefore stays at the time up to which nothing can arrive any more. It uses every measurement at its own
+//! time, in order. It publishes its motion and its covariance, carried on to the present with the readings
+//! since. Using a measurement at its own time is exact, where correcting the present by an old innovation is
+//! not. It is also cheap: readings are integrated twice, and a covariance is carried once for each
+//! measurement. The price is that a fast sensor waits for the slow ones' delay. Meanwhile the present drifts
+//! by the IMU's noise: with the default IMU and 200 ms, by 1 mm/s and 0.005°.
 //!
 //! *Waiting measurements.* A measurement is used as soon as every sensor has shown one at least as late, and at the latest
 //! when it is `delay_max_ms` old. One that arrives later than that is refused.

@@ -1,7 +1,7 @@
 //! Growth of the filter's errors from one time to a later one.
 //!
-//! With the attitude's error as a rotation about the *world's* axes, R_true = exp(θ×)·R, the errors of
-//! position, velocity and attitude and of the biases of gyroscope and accelerometer follow
+//! The attitude's error is a rotation about the *world's* axes, R_true = exp(θ×)·R. The errors of position,
+//! velocity and attitude and of the biases of gyroscope and accelerometer follow
 //!
 //! dp/dt = v,  dv/dt = −f_W × θ − R·(b_a + n_a),  dθ/dt = −R·(b_g + n_g)
 //!

@@ -31,7 +31,8 @@ struct Scope<'d, 'i> {
 /// Reads the only model of the element `<sdf>`. The model's frame is that of its element.
 ///
 /// # Errors
-/// If there is not one model, it includes another that was not found, an element is missing or not of its kind, or the joints do not form a tree.
+/// If there is not one model, or it includes another that was not found. If an element is missing or not of
+/// its kind, or the joints do not form a tree.
 pub fn read<'a>(source: Source<'a>, sdf: Node) -> Result<Model<'a>, Diagnostic> {
     let model = only_model(source, sdf)?;
     let mut scopes = Vec::new();

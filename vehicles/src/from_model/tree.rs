@@ -12,8 +12,8 @@ pub type Step = (usize, Option<usize>);
 /// Orders links so that each stands behind its parent.
 ///
 /// # Errors
-/// If two links have one name, a joint names a link that is not there, a link has two parents, there are two roots, or
-/// joints form a cycle.
+/// If two links have one name, or a joint names a link that is not there. If a link has two parents, there
+/// are two roots, or joints form a cycle.
 pub fn order(source: Source, links: &[Link], joints: &[Joint]) -> Result<Vec<Step>, Diagnostic> {
     let index = index(source, links)?;
     let above = parents(source, &index, joints)?;

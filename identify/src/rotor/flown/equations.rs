@@ -1,9 +1,10 @@
 //! Flights as linear equations for thrust and torque coefficients: the same windows as in `prepared`, whose derivatives
 //! of measurements go over to the window.
 //!
-//! Forces, by the mass: f = sum_i (k_T / m) w_i^2 a_i, with the air's part at speed beside it: the rotors' drag and loss of
-//! lift in a climb, which grow with speed times w, lift by speed across the rotor, and the body's drag, which grows with the
-//! square of the speed. Torques about z, by I_zz: the rotors' drag, the spin-up of the rotors, and a trim.
+//! Forces, by the mass: f = sum_i (k_T / m) w_i^2 a_i, with the air's part at speed beside it. The rotors'
+//! drag and loss of lift in a climb grow with speed times w. Lift by speed across the rotor and the body's
+//! drag grow with the square of the speed. Torques about z, by I_zz: the rotors' drag, the spin-up of the
+//! rotors, and a trim.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use std::ops::Range;

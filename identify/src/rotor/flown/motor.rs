@@ -1,8 +1,8 @@
 //! The motor that follows the commands of all courses best: command map, lag, delay, and dependence on the voltage.
 //!
-//! w(t) is the answer of 1 / (a2 s^2 + a1 s + 1) to (low + (high - low) x(t - delay)) (U / U_ref)^power, where x is the part
-//! of the command map's range. The speeds are simulated from the commands alone (an output-error model, Ljung, System
-//! Identification, 2nd ed., section 4.3), and what is left is whitened.
+//! w(t) is the answer of 1 / (a2 s^2 + a1 s + 1) to (low + (high - low) x(t - delay)) (U / U_ref)^power. x is
+//! the part of the command map's range. The speeds are simulated from the commands alone (an output-error
+//! model, Ljung, System Identification, 2nd ed., section 4.3), and what is left is whitened.
 
 use super::course::{Course, Input};
 use super::least_squares::{self, Rows, Solution, Weighting};
