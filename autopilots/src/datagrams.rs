@@ -100,7 +100,7 @@ impl Datagrams {
         Err(self.firmware.silence(self.limit))
     }
 
-    /// Length of the next datagram; `None` if somebody else has sent it.
+    /// Length of the next datagram; `None` if another process has sent it.
     fn next(&mut self, bytes: &mut [u8]) -> io::Result<Option<usize>> {
         let (length, sender) = self.socket.recv_from(bytes)?;
         let peer = match self.peer {

@@ -1,4 +1,4 @@
-//! Samples of a run for watchers: a ring in shared memory that the recorder fills while somebody watches.
+//! Samples of a run for watchers: a ring in shared memory that the recorder fills while there is a watcher.
 //!
 //! A watcher makes the ring. The recorder takes every sample, finds the ring, and copies each sample into it. Neither waits
 //! for the other: the recorder overwrites the oldest samples, and a watcher that was too slow goes on with the newest.
@@ -82,7 +82,7 @@ impl WatchFiles {
         let _ = std::fs::remove_file(&self.ring);
     }
 
-    /// True if somebody watches. A ring without a length is being made.
+    /// True if there is a watcher. A ring without a length is being made.
     #[must_use]
     pub fn is_there(&self) -> bool {
         self.ring.symlink_metadata().is_ok_and(|found| found.len() > 0)

@@ -60,7 +60,7 @@ impl Cluster<'_> {
     /// Flies `jobs`; hands each row to `take` as it comes. Cancels the tasks once `stop` is used.
     ///
     /// # Errors
-    /// If Slurm refuses the tasks, somebody cancels them, no task flies a flight, or `take` fails.
+    /// If Slurm refuses the tasks, they are cancelled, no task flies a flight, or `take` fails.
     pub fn fly(&self, jobs: &[Job], stop: &StopToken, mut take: impl FnMut(Row) -> Result<()>) -> Result<()> {
         let mut flights = Flights { wanted: jobs.iter().map(|job| (job.flight, job)).collect(), flown: 0 };
         let shared = Shared::new(self.folder);

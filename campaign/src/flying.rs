@@ -23,7 +23,7 @@ pub struct Flying<'a> {
     stop: &'a StopToken,
 }
 
-/// Rows that nobody has taken yet, by number of the flight.
+/// Rows that are not taken yet, by number of the flight.
 #[derive(Debug, Default)]
 struct Rows {
     rows: Mutex<Found>,

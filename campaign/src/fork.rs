@@ -55,7 +55,7 @@ impl FromStr for Vary {
     }
 }
 
-/// A value as TOML: what is none is a text without quotes.
+/// A value as TOML. A text that is not TOML is taken as a text without quotes.
 fn literal(value: &str) -> String {
     let is_toml = value.parse::<toml::Value>().is_ok();
     if is_toml || value.is_empty() { value.to_owned() } else { toml::Value::from(value).to_string() }

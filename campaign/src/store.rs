@@ -200,7 +200,7 @@ fn has_rows(path: &Path) -> Result<bool> {
     Ok(BufReader::new(file).lines().nth(1).is_some())
 }
 
-/// Removes a plan as it was drawn, which nobody edited, and the head of rows that were never flown.
+/// Removes an unedited plan, as it was drawn, and the head of rows that were never flown.
 fn forget(folder: &Path, lock: &mut File) -> Result<()> {
     let mut drawn = String::new();
     lock.rewind()?;

@@ -18,7 +18,7 @@ const EVENT_BYTES: usize = 8;
 /// Kinds of events.
 const BUTTON: u8 = 1;
 const AXIS: u8 = 2;
-/// Mark of an event that tells a position at the opening.
+/// Mark of an event that has a position at the opening.
 const INITIAL: u8 = 0x80;
 /// Events that are read at once.
 const EVENTS: usize = 64;

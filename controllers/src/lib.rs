@@ -13,7 +13,8 @@
 //! - [`velocity`]: velocity PD around the cascade; `approach`: how fast to come near a wall.
 //! - [`wall_stop`], [`wall_follow`]: guidance by range finders, around the velocity PD; `legs`: the states along the walls;
 //!   [`room`]: where the walls must be although other vehicles stand in the beams.
-//! - [`wall_stop_thesis`], [`wall_follow_thesis`]: the same as the thesis tells it; `free_flight`: its tilt by distance.
+//! - [`wall_stop_thesis`], [`wall_follow_thesis`]: the thesis's own versions; `free_flight`: its tilt by
+//!   distance.
 //! - [`position_hold`]: holds the place between the pilot's commands, around a law about hover.
 //! - [`rc`]: raw channels of a remote control, by a script, a recording of a receiver, or a `gamepad`; `pulses`: their ranges.
 //! - [`remote_control`]: turns set points into the sticks and switches of a remote control.

@@ -1,4 +1,4 @@
-//! Fault of a file that somebody wrote: the place, what was expected, what was found, what to do.
+//! Fault of a file that a person wrote: the place, what was expected, what was found, what to do.
 
 use crate::nearest::nearest;
 use crate::parameter::{FileFault, FileFaults, ParameterError};

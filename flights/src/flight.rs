@@ -89,9 +89,10 @@ pub struct Flight {
     pub specific_force: Channel<3>,
     /// Voltage of the battery in V.
     pub battery_voltage: Channel<1>,
-    /// True if a rig holds the vehicle at a point, false if it flies freely; `None` if nobody said so.
+    /// True if a rig holds the vehicle at a point, false if it flies freely; `None` if that is not stated.
     pub on_rig: Option<bool>,
-    /// True if its torques are not to be compared, since the commands do not tell them: `torques = false`.
+    /// True if its torques are not to be compared, since the commands do not determine them:
+    /// `torques = false`.
     pub without_torques: bool,
     /// Assumptions of the flights file in place of measurements, such as a level attitude.
     pub assumed: Vec<String>,

@@ -1,5 +1,5 @@
-//! Commands that a logger held, or that an exporter filled in: nobody knows them there. They are left out, so that every reader
-//! finds a gap.
+//! Commands that a logger held, or that an exporter filled in: the true ones are unknown there. They are left
+//! out, so that every reader finds a gap.
 
 use crate::canonical::turning;
 use crate::flight::{Channel, Flight, median};

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Time between two looks at a flight, s.
 const STEP_S: f64 = 0.01;
-/// Part of the time within a range: what is left out are outliers and moments.
+/// Part of the time within a range: outliers and short moments are left out.
 const SHARE: f64 = 0.99;
 
 /// A limit of the envelope.

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 const STEPS_MAX: usize = 8;
 /// A fit is done when a step changes every parameter by less than this part of its standard error.
 const SMALL_STEP: f64 = 0.02;
-/// A pivot below this part of a column's own length is none.
+/// A pivot below this part of a column's own length counts as zero.
 const PIVOT_MIN: f64 = 1e-9;
 
 /// The equations Z'W (r + X d) = 0 of a stretch of time.

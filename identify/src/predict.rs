@@ -75,7 +75,8 @@ impl Measured {
         Self { pieces_s, settling_s, ..self }
     }
 
-    /// With the measured attitude and rates in place of predicted ones, so that what is left is due to forces alone.
+    /// With the measured attitude and rates in place of predicted ones, so that the errors are due to forces
+    /// alone.
     pub fn turning_as_measured(self) -> Self {
         Self { turns_as_measured: true, ..self }
     }

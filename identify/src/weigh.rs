@@ -1,4 +1,5 @@
-//! The noise of an estimation problem: what is left of each component when all candidates have taken their step.
+//! The noise of an estimation problem: the residual of each component when all candidates have taken their
+//! step.
 #![allow(
     clippy::disallowed_types,
     reason = "not in a component: reports of flights, whose products are summed by hand"

@@ -1,4 +1,4 @@
-//! Flights with an effect that nobody declared: it is named, and nothing else is. The whole table is made by
+//! Flights with an undeclared effect: it is named, and nothing else is. The whole table is made by
 //! `cargo run --release -p hummingbus-identify --example confusion`, see docs/validation.md.
 use crate::simulated;
 use crate::skipped::{cases, first, is_left, is_thorough};

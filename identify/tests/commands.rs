@@ -327,7 +327,7 @@ fn forces_alone_are_judged_where_torques_are_not_compared() {
     assert!(report.to_string().contains("predictions take the measured attitude"), "{report}");
 }
 
-/// At 5 Hz the motors have settled three times between two commands, at speeds that nobody knows.
+/// At 5 Hz the motors have settled three times between two commands, at unknown speeds.
 #[test]
 fn commands_far_apart_are_refused() {
     let slow = changed(&heavy(20.0), |flight| keep(&mut flight.command, |at, _| at.is_multiple_of(200)));

@@ -22,7 +22,7 @@
 //! | `others` | which vehicles of the traffic are others |
 //! | `output` | what a plant publishes |
 //! | [`propeller_stand`] | one rotor alone, bolted down |
-//! | [`traffic`] | the node that tells all plants of a run where the others are |
+//! | [`traffic`] | the node that sends all plants of a run the positions of the others |
 //!
 //! ```
 //! use nalgebra::Vector3;

@@ -62,7 +62,7 @@ enum BackendName {
     Rapier,
 }
 
-/// Greatest speed of an impact that a Hummingbird bears, as far as anybody knows: tuned, no source.
+/// Greatest speed of an impact that a Hummingbird survives: tuned, no source.
 const CRASH_SPEED_M_S: f64 = 1.0;
 
 /// More steps than these gain nothing at 1 kHz, and would look like a run that hangs: tuned, no source.

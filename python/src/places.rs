@@ -75,7 +75,7 @@ impl Places {
     /// Array of the message of `size` bytes at `start`: the same one at each tick with a message there.
     ///
     /// # Safety
-    /// The message is there, and nobody else changes it, until the step ends.
+    /// The message is there and does not change until the step ends.
     pub(crate) unsafe fn message(
         &mut self,
         py: Python<'_>,

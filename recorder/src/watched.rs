@@ -1,4 +1,4 @@
-//! The recorder's samples for watchers: copied into a ring in shared memory while somebody watches.
+//! The recorder's samples for watchers: copied into a ring in shared memory while there is a watcher.
 
 use bus::BusError;
 use bus::announcement::Announcement;
@@ -61,7 +61,7 @@ impl Watched {
         Ok(Some(Self::Open(WatchWriter::attach(files, &topics)?)))
     }
 
-    /// True if somebody watches.
+    /// True if there is a watcher.
     pub fn is_open(&self) -> bool {
         matches!(self, Self::Open(_))
     }

@@ -18,7 +18,7 @@ use vehicles::{EffectEntry, Vehicle};
 pub struct Wind {
     /// Velocity of the steady wind, in the world.
     pub velocity_W_m_s: [f64; 3],
-    /// True if random gusts are added to it. No file tells their course.
+    /// True if random gusts are added to it. No file has their course.
     pub has_gusts: bool,
 }
 

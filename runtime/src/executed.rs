@@ -27,7 +27,7 @@ struct Version {
     digest: Option<String>,
 }
 
-/// Device, number, length and time of the last writing. It tells versions apart without reading them.
+/// Device, number, length and time of the last writing. It distinguishes versions without reading them.
 type State = (u64, u64, u64, i64, i64);
 
 /// Largest file that is read at the first look, in bytes: no start of a run waits for one that is much larger. Such a file is seldom a

@@ -1,9 +1,9 @@
 //! The location that a path names: an opened folder and a name in it. Once it is found, no change of the path can
 //! redirect it.
 //!
-//! A link of another user than root is followed only in a folder into which nobody but this user and root may write.
-//! This is stricter than a kernel with `fs.protected_symlinks`: that follows links of a folder's owner, who may have
-//! planted them as well.
+//! A link of another user than root is followed only in a folder into which only this user and root may
+//! write. This is stricter than a kernel with `fs.protected_symlinks`: that follows links of a folder's
+//! owner, who may have planted them as well.
 
 use anyhow::anyhow;
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, Stat};

@@ -507,7 +507,7 @@ pub fn find_live(run_id: Option<&str>) -> Result<LiveRun, Error> {
 /// on this terminal.
 ///
 /// # Errors
-/// As [`find_live`], or if the only run was started elsewhere: it may be somebody's long flight.
+/// As [`find_live`], or if the only run was started elsewhere: it may be a long flight of another person.
 pub fn find_own(run_id: Option<&str>) -> Result<LiveRun, Error> {
     let run = find_live(run_id)?;
     if run_id.is_none() {

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Arguments of `clean`.
 #[derive(Args)]
 pub struct CleanArguments {
-    /// Only tell what would be removed.
+    /// Only list what would be removed.
     #[arg(long)]
     dry_run: bool,
     /// Print JSON.

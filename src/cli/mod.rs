@@ -70,7 +70,7 @@ commands! {
         after_help = "Example: hummingbus run manifests/hover.toml --pace realtime --set run.seed=7\n         hummingbus run --from hover.6000.ckpt --fork 100 --vary process.plant.vehicle.body.mass=factor:uniform:0.9,1.1"
     )]
     Run(fork::RunOrForkArguments) => fork::run;
-    /// Fly a manifest as `run` does, and tell where the host time of its ticks goes.
+    /// Fly a manifest as `run` does, and show where the host time of its ticks goes.
     #[command(
         after_help = "Example: hummingbus profile manifests/hover.toml --html profile.html --trace trace.json"
     )]

@@ -69,7 +69,7 @@ fn chosen(name: Option<&str>) -> Result<Vec<&'static Schema>> {
     Ok(schemas)
 }
 
-/// The names of messages: without their packages, but for those that only their packages tell apart.
+/// The names of messages: without their packages, but for those that only their packages distinguish.
 fn distinct_names(schemas: &[&'static Schema]) -> Vec<&'static str> {
     let is_alone = |name: &str| schemas.iter().filter(|other| short(other) == name).count() == 1;
     let name = |schema: &&'static Schema| {

@@ -1,5 +1,5 @@
-//! Processes that nobody started: a second clock, a second process of a node. They are refused, and the run goes on
-//! as if nothing had been.
+//! Processes that the launcher did not start: a second clock, a second process of a node. They are refused,
+//! and the run goes on as if nothing had been.
 
 use crate::flight::{Reference, Watched, manifest};
 use crate::support::{HUMMINGBUS, Place};

@@ -1,4 +1,4 @@
-//! Identification as a user runs it: flights of a truth that nobody declared, flown on the bus, and what is refused.
+//! Identification as a user runs it: flights of an undeclared truth, flown on the bus, and refusals.
 
 use crate::skipped::{first, is_left, quick_or};
 use crate::support::{Place, repository};

@@ -1,5 +1,5 @@
 //! The flight envelope in which a model of a vehicle was validated: the ranges of the flights that its predictions were
-//! compared with. Beyond them nobody has looked.
+//! compared with. Beyond them it was not compared.
 
 use crate::reader::Section;
 use diagnostics::unit::{ACCELERATION, ANGLE, Dimension, FREQUENCY, LENGTH, SPEED, VELOCITY};

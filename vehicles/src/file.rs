@@ -288,7 +288,7 @@ fn layout(root: &Section) -> Result<Vec<Rotor>, Diagnostic> {
     }
 }
 
-/// Refuses two rotors of one name: messages and reports tell rotors apart by their names.
+/// Refuses two rotors of one name: messages and reports distinguish rotors by their names.
 fn require_names(rotors: &[Section]) -> Result<(), Diagnostic> {
     let named = |section: &Section| section.text("name").map(str::to_owned);
     let names = Diagnostic::gather(rotors.iter().map(named))?;

@@ -1,4 +1,5 @@
-//! Commands that a logger held: they repeat to the last bit while the vehicle goes on turning. Nobody knows them there.
+//! Commands that a logger held: they repeat to the last bit while the vehicle goes on turning. The true ones
+//! are unknown there.
 
 use crate::command_log::{CommandLog, Stretch, is_fine};
 

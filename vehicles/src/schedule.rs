@@ -17,7 +17,7 @@ impl<'d, 't> Section<'d, 't> {
     /// the file has one.
     ///
     /// # Errors
-    /// The points that are none, each with its place.
+    /// The invalid points, each with its place.
     pub fn schedule(
         &self,
         name: &'d str,

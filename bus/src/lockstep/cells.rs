@@ -1,7 +1,7 @@
 //! The layout of the control segment: cells of named atomics, each on cache lines of its own.
 //!
 //! Words that one party writes together stand in one cell. Words that other parties read at every tick are not in a
-//! cache line that somebody writes at every tick.
+//! cache line that is written at every tick.
 
 use crate::step_times::BUCKETS;
 use std::sync::atomic::{AtomicU32, AtomicU64};

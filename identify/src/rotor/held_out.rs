@@ -7,7 +7,7 @@ use super::error::RotorError;
 use super::stand::{Column, Source, Stand};
 use super::table::LogTable;
 
-/// A log with the columns that tell its rows from another's, each with the factor of its numbers.
+/// A log with the columns that distinguish its rows from another's, each with the factor of its numbers.
 struct Log<'s> {
     role: Role,
     source: Source<'s>,

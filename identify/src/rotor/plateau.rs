@@ -97,7 +97,7 @@ pub fn without_outliers(rows: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, usize) {
     (kept, outliers)
 }
 
-/// The standard deviation as the median absolute deviation tells it.
+/// The standard deviation, estimated from the median absolute deviation.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     let deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();

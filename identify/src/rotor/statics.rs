@@ -169,7 +169,7 @@ impl<'s> Log<'s> {
     }
 
     /// Returns the stand's reading at rest before the run, with its standard error from the readings' scatter. A rest
-    /// after the run only shows the drift: by then a stand is warm, and somebody may be at it.
+    /// after the run only shows the drift: by then a stand is warm, and a person may be at it.
     fn tare(
         &self,
         quantity: &Quantity,

@@ -1,4 +1,4 @@
-//! Chance that a mean gain over blocks of time is none.
+//! Chance that a mean gain over blocks of time is zero.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};

@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 /// No place among the unknowns: a body that nothing moves.
 const FIXED: usize = usize::MAX;
 
-/// A coefficient of friction below this is none.
+/// A coefficient of friction below this counts as zero.
 const FRICTIONLESS: f64 = 1e-6;
 
 /// Steps of the interior-point method for one shift. Tuned, no source.

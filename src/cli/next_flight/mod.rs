@@ -41,7 +41,8 @@ pub const MANIFEST: &str = "next-flight.toml";
 /// Name of the set points in the folder.
 pub const SET_POINTS: &str = "next-flight.csv";
 
-/// A separation below this, in standard errors, is none: no raising of a single limit makes an answer of it.
+/// A separation below this, in standard errors, counts as zero: no raising of a single limit makes an answer
+/// of it.
 const NO_SEPARATION: f64 = 0.3;
 
 /// Advice where no limit helps.

@@ -64,7 +64,7 @@ pub struct FlownMotor {
 pub struct RotorMotor {
     /// Its name in the vehicle file.
     pub name: String,
-    /// Its motor; absent where its flights do not tell it.
+    /// Its motor; absent if its flights do not determine it.
     pub motor: Option<MotorFigures>,
 }
 

@@ -60,7 +60,7 @@ struct Set<'f> {
     flights: Vec<Equations<'f>>,
     /// The same with the noise of their rotor speeds twice.
     noisy: Vec<Equations<'f>>,
-    /// Bias of the accelerometer along z of each flight in m/s^2, where the motion tells it.
+    /// Bias of the accelerometer along z of each flight in m/s^2, where the motion determines it.
     biases: Vec<Option<Estimate>>,
     blocks: Blocks,
     vehicle: &'f Vehicle,

@@ -2,7 +2,7 @@
 //!
 //! w(t) is the answer of 1 / (a2 s^2 + a1 s + 1) to (low + (high - low) x(t - delay)) (U / U_ref)^power. x is
 //! the part of the command map's range. The speeds are simulated from the commands alone (an output-error
-//! model, Ljung, System Identification, 2nd ed., section 4.3), and what is left is whitened.
+//! model, Ljung, System Identification, 2nd ed., section 4.3), and the residual is whitened.
 
 use super::course::{Course, Input};
 use super::least_squares::{self, Rows, Solution, Weighting};
@@ -85,7 +85,7 @@ pub fn lag(values: &Values) -> Lag {
     Lag { a1_s: values[A1], a2_s2: values[A2] }
 }
 
-/// Fits a motor to `courses`, from `start` or else from a search; `None` if they do not tell it.
+/// Fits a motor to `courses`, from `start` or else from a search; `None` if they do not determine it.
 pub fn fitted(courses: &[Course], form: Form, start: Option<Values>) -> Option<Fit> {
     let free = form.free();
     let mut values = start.or_else(|| searched(courses, form))?;

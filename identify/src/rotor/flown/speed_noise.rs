@@ -12,7 +12,7 @@ use vehicles::ROTORS_MAX;
 use super::least_squares::{self, Prior, Rows, Solution, Weighting};
 use crate::normal::{self, Block};
 
-/// Beyond this part of the squares of a column, noise hides what it tells.
+/// Beyond this part of the squares of a column, noise hides its signal.
 const HIDDEN: f64 = 0.5;
 
 /// A solution with the noise of the speeds taken off.

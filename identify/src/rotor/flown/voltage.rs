@@ -29,7 +29,8 @@ fn has_voltage(flight: &Flight) -> bool {
     flight.battery_voltage.values.iter().any(|[voltage_v]| *voltage_v > 0.0)
 }
 
-/// Part of the variance of the voltages that is noise, as neighbouring samples tell it; 1 where nothing varies.
+/// Part of the variance of the voltages that is noise, estimated from neighbouring samples; 1 if all voltages
+/// are equal.
 pub fn noise_share(flights: &[&Flight]) -> f64 {
     let channels = || flights.iter().map(|flight| &flight.battery_voltage);
     let all: Vec<f64> =
