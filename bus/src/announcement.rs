@@ -1,87 +1,46 @@
-//! Announcement of a topic by its publisher before the run starts, and the check of every reader.
+//! Announcement of a topic in the directory of a run, and the check of every reader.
 
 use crate::error::BusError;
 use crate::json_file;
 use crate::plan::{InputPlan, NodePlan, Plan};
-use crate::schema::{Extent, Schema};
-use serde::{Deserialize, Serialize};
+use crate::schema::Schema;
 use std::path::{Path, PathBuf};
 
-/// The message type of a topic, as its publisher was built with it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Announcement {
-    /// Three-part type name.
-    pub type_name: String,
-    /// Size of a message in bytes.
-    pub size: usize,
-    /// Hash of the layout.
-    pub layout_hash: u64,
-    /// The layout as a table, for error messages.
-    pub layout: String,
-    /// The ROS 2 definition, for recordings.
-    pub definition: String,
-    /// Offset of a message's stamp in bytes, if it has one.
-    pub stamp_offset: Option<usize>,
-    /// The part of a message's bytes that counts; absent where it is all of them.
-    #[serde(default)]
-    pub extent: Option<Extent>,
+pub use ::component::announcement::Announcement;
+
+/// Writes `announcement` to `path`.
+pub(crate) fn store(path: &Path, announcement: &Announcement) -> Result<(), BusError> {
+    json_file::store(path, announcement)
 }
 
-impl Announcement {
-    /// The announcement of a publisher that was built with `schema`.
-    #[must_use]
-    pub fn of(schema: &Schema) -> Self {
-        Self {
-            type_name: schema.type_name.to_owned(),
-            size: schema.size,
-            layout_hash: schema.layout_hash(),
-            layout: schema.layout(),
-            definition: schema.ros2_definition(),
-            stamp_offset: schema.stamp_offset(),
-            extent: schema.extent(),
-        }
-    }
+/// Reads the announcement at `path`.
+pub(crate) fn load(path: &Path) -> Result<Announcement, BusError> {
+    json_file::load(path, "the announcement of a message type")
+}
 
-    /// The part of `message`, the bytes of a message without its header, that counts.
-    #[must_use]
-    pub fn used<'a>(&self, message: &'a [u8]) -> &'a [u8] {
-        self.extent.map_or(message, |extent| extent.of(message))
+/// Checks that `reader`, built with `schema`, reads the bytes of topic number `topic` of `plan` as they are meant.
+pub(crate) fn check(
+    announcement: &Announcement,
+    schema: &Schema,
+    plan: &Plan,
+    topic: usize,
+    reader: &Reader<'_>,
+) -> Result<(), BusError> {
+    if announcement.layout_hash == schema.layout_hash() {
+        return Ok(());
     }
-
-    /// Writes the announcement to `path`.
-    pub(crate) fn store(&self, path: &Path) -> Result<(), BusError> {
-        json_file::store(path, self)
-    }
-
-    /// Reads the announcement at `path`.
-    pub(crate) fn load(path: &Path) -> Result<Self, BusError> {
-        json_file::load(path, "the announcement of a message type")
-    }
-
-    /// Checks that `reader`, built with `schema`, reads the bytes of topic number `topic` of `plan` as they are meant.
-    pub(crate) fn check(
-        &self,
-        schema: &Schema,
-        plan: &Plan,
-        topic: usize,
-        reader: &Reader<'_>,
-    ) -> Result<(), BusError> {
-        if self.layout_hash == schema.layout_hash() {
-            return Ok(());
-        }
-        let sender = &plan.nodes[plan.publisher(topic)];
-        let output = sender.outputs.iter().find(|output| output.topic == topic);
-        Err(BusError::LayoutMismatch {
-            topic: plan.topics[topic].name.clone(),
-            node: reader.node.to_owned(),
-            port: reader.port.to_owned(),
-            expected: schema.layout(),
-            sender: sender.name.clone(),
-            sender_port: output.map(|output| output.port.clone()).unwrap_or_default(),
-            found: self.layout.clone(),
-            advice: advice(reader, sender),
-        })
-    }
+    let sender = &plan.nodes[plan.publisher(topic)];
+    let output = sender.outputs.iter().find(|output| output.topic == topic);
+    Err(BusError::LayoutMismatch {
+        topic: plan.topics[topic].name.clone(),
+        node: reader.node.to_owned(),
+        port: reader.port.to_owned(),
+        expected: schema.layout(),
+        sender: sender.name.clone(),
+        sender_port: output.map(|output| output.port.clone()).unwrap_or_default(),
+        found: announcement.layout.clone(),
+        advice: advice(reader, sender),
+    })
 }
 
 /// Reader of a topic.

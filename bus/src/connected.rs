@@ -141,9 +141,15 @@ impl ConnectedNode {
         let restored = Samples::of_run(&links.run_dir, &links.plan)?;
         for (input, declared) in links.node.inputs.iter().zip(declared) {
             let topic = &links.plan.topics[input.topic];
-            let announcement = Announcement::load(&announcement::topic_path(&links.run_dir, input.topic))?;
+            let announcement = announcement::load(&announcement::topic_path(&links.run_dir, input.topic))?;
             if let Declared::Typed(schema) = declared {
-                announcement.check(schema, &links.plan, input.topic, &Reader::of(&links.node, input))?;
+                announcement::check(
+                    &announcement,
+                    schema,
+                    &links.plan,
+                    input.topic,
+                    &Reader::of(&links.node, input),
+                )?;
             }
             let initial = declared.initial_value(input, &links.node.name)?;
             let generation = links.publisher(membership, input.topic).primary.generation;
@@ -225,7 +231,7 @@ impl ConnectedNode {
             let source = Source::joined(generation, receiver, limit, topic.ticks);
             let input =
                 InputPlan { port: output.port.clone(), topic: output.topic, delay_ticks: 1, initial: None };
-            let announced = Announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;
+            let announced = announcement::load(&announcement::topic_path(&links.run_dir, output.topic))?;
             let mut port = InPort::new(&input, topic, &announced, None, Feed::Shared(source));
             port.left_behind = links.left_behind(output.topic, announced.size)?;
             self.stepper.predecessor.push(port);

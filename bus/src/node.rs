@@ -478,9 +478,9 @@ impl Node {
     fn announce_topic(&self, topic: usize, schema: &Schema) -> Result<(), BusError> {
         let path = announcement::topic_path(&self.run_dir, topic);
         if self.generation == 0 {
-            return Announcement::of(schema).store(&path);
+            return announcement::store(&path, &Announcement::of(schema));
         }
-        let announced = Announcement::load(&path)?;
+        let announced = announcement::load(&path)?;
         if announced.layout_hash == schema.layout_hash() {
             return Ok(());
         }

@@ -5,6 +5,7 @@ use crate::announcement::Announcement;
 use crate::component::{StateError, StepError};
 use crate::context::StepContext;
 use crate::initial;
+use crate::making::make_for;
 use crate::message::{BODY_START, CDR_START, cdr_bytes};
 use crate::messages::Time;
 use crate::plan::{InputPlan, NodePlan, Plan};
@@ -61,7 +62,7 @@ impl NodeHarness {
         node: usize,
     ) -> Result<Self, ParameterError> {
         let node = &plan.nodes[node];
-        let mut made = component.make_for(plan, node, &InputFiles::default(), None)?;
+        let mut made = make_for(component, plan, node, &InputFiles::default(), None)?;
         let wire = |name: &str, schema: &'static Schema, is_forwarded: bool| {
             let output = node.outputs.iter().find(|output| output.port == name);
             let topic = output.map(|output| (output.topic, plan.topics[output.topic].ticks));

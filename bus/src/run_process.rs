@@ -9,6 +9,7 @@ use crate::error::BusError;
 use crate::executor::{Executor, Member};
 use crate::handles::Wiring;
 use crate::join::Join;
+use crate::making;
 use crate::node::Node;
 use crate::port::{InPort, Locals, OutPort};
 use crate::ports::{InputSamples, OutputSamples, SampleSink, SampleSource};
@@ -25,22 +26,24 @@ use std::path::PathBuf;
 /// # Errors
 /// If the process was not started by a launcher, the manifest and the component do not fit, or as the component says.
 pub fn run_process<C: Component + 'static>() -> Result<(), BusError> {
-    Registration::of::<C>().run(Join::from_environment()?, &[])
+    run_component(&Registration::of::<C>(), Join::from_environment()?, &[])
 }
 
-impl Registration {
-    /// Runs the component as the node that `join` names, until the run ends or another process has taken its place.
-    /// `components` are those of the program: forwarded messages are of their types.
-    ///
-    /// # Errors
-    /// If the manifest and the component do not fit, a step fails, or the run is aborted.
-    pub fn run(&self, join: Join, components: &'static [Registration]) -> Result<(), BusError> {
-        let mut part = Part::make(join, self, components)?;
-        let connected = part.take_node()?.connect()?;
-        let member = part.member(connected)?;
-        let end = Executor::alone(member).run();
-        finish([part], end)
-    }
+/// Runs `component` as the node that `join` names, until the run ends or another process has taken its place.
+/// `components` are those of the program: forwarded messages are of their types.
+///
+/// # Errors
+/// If the manifest and the component do not fit, a step fails, or the run is aborted.
+pub fn run_component(
+    component: &Registration,
+    join: Join,
+    components: &'static [Registration],
+) -> Result<(), BusError> {
+    let mut part = Part::make(join, component, components)?;
+    let connected = part.take_node()?.connect()?;
+    let member = part.member(connected)?;
+    let end = Executor::alone(member).run();
+    finish([part], end)
 }
 
 /// A node of this process before its first tick.
@@ -80,7 +83,7 @@ impl Part {
     ) -> Result<Self, BusError> {
         let wiring = node.declare(registration, components)?;
         let (plan, node_plan) = node.plan();
-        let made = registration.make_for(plan, node_plan, files, node.run_dir());
+        let made = making::make_for(registration, plan, node_plan, files, node.run_dir());
         let instance = made.map_err(|reason| node.error(reason))?;
         let (name, transfer) = (node.name().to_owned(), registration.transfer);
         let (process, remark_path) = (node.process_name(), node.remark_path());

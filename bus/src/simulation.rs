@@ -1,6 +1,6 @@
 //! A run in the memory of one thread: no processes, no shared memory, no clock.
 
-use crate::announcement::{Announcement, Reader};
+use crate::announcement::{self, Announcement, Reader};
 use crate::checkpoint::{NodePart, Parts};
 use crate::depths::depths;
 use crate::error::BusError;
@@ -271,7 +271,7 @@ impl Simulation {
         let index = self.topic_index(name)?;
         if let Some(announcement) = &self.announcements[index] {
             let host = Reader { node: "the simulation's host", port: name, is_built_in: false };
-            announcement.check(T::SCHEMA, &self.plan, index, &host)?;
+            announcement::check(announcement, T::SCHEMA, &self.plan, index, &host)?;
         }
         Ok(Topic { index, message: PhantomData })
     }
@@ -413,7 +413,7 @@ impl Declaration {
             let topic = &plan.topics[input.topic];
             let announcement = announced(input.topic);
             if let Declared::Typed(schema) = declared {
-                announcement.check(schema, plan, input.topic, &Reader::of(node, input))?;
+                announcement::check(announcement, schema, plan, input.topic, &Reader::of(node, input))?;
             }
             let initial = declared.initial_value(input, &node.name)?;
             let feed = Feed::Local { generation: 0 };

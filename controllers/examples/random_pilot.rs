@@ -32,7 +32,7 @@ struct Move {
 
 /// A pilot's head and hand.
 struct Pilot {
-    random: bus::random::Stream,
+    random: component::random::Stream,
 }
 
 impl Pilot {
@@ -93,7 +93,7 @@ impl Pilot {
 
 /// The recording of the stick named `channel`, "roll" or "pitch", as CSV.
 pub fn recording(channel: &str, seed: u64) -> String {
-    let mut pilot = Pilot { random: bus::random::stream(seed, "random pilot") };
+    let mut pilot = Pilot { random: component::random::stream(seed, "random pilot") };
     let mut text = String::from("time_s,roll_deg,pitch_deg\n");
     for (row, stick_deg) in pilot.stick_deg().into_iter().enumerate() {
         let time_s = row as f64 * ROW_S;

@@ -14,8 +14,8 @@
 
 use crate::bounded::{BoundedLeastSquares, Parts};
 use crate::wrench_part::Part;
-use bus::Bounded;
-use bus::messages::PerRotor;
+use component::Bounded;
+use component::messages::PerRotor;
 use nalgebra::{Matrix4, Vector3, Vector4};
 use std::cmp::Ordering;
 use vehicles::{ROTORS_MAX, Vehicle};

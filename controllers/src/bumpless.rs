@@ -26,7 +26,7 @@ const ACCELERATION_MAX_RAD_S2: f64 = 10.0;
 /// The transfer to one law on one vehicle.
 ///
 /// ```
-/// use bus::messages::{SetPoint, StateEstimate};
+/// use component::messages::{SetPoint, StateEstimate};
 /// use controllers::airframe::ControlledVehicle;
 /// use controllers::{bumpless::BumplessTransfer, controller_state::ControllerState};
 /// use controllers::{law_inputs::SetPointInputs, pid::PidLaw, pid_gains::PidGains};

@@ -21,7 +21,7 @@ use crate::control::{ControlOutput, HoverMotion, Integrals};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::set_points::SetPoint;
-use bus::component::Info;
+use component::Info;
 use diagnostics::ParameterError;
 use diagnostics::parameter::within;
 use nalgebra::Vector3;
@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 const ATTITUDE_EVERY_MAX: f64 = 1000.0;
 
 /// Parameters.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]
@@ -48,12 +48,12 @@ pub struct Parameters {
 /// The law at one period, with everything that does not change during a run.
 ///
 /// ```
-/// use bus::messages::{SetPoint, StateEstimate};
+/// use component::messages::{SetPoint, StateEstimate};
 /// use controllers::{cascade::CascadeLaw, controller::Controller, law_inputs::SetPointInputs};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle });
-/// let mut cascade = bus::Harness::<Controller<CascadeLaw>>::from_json(&parameters).unwrap();
+/// let mut cascade = component::Harness::<Controller<CascadeLaw>>::from_json(&parameters).unwrap();
 /// let (set_point, estimate) = (SetPoint { roll: 0.1, ..Default::default() }, StateEstimate::default());
 /// let inputs = || SetPointInputs { set_point: &set_point, estimate: &estimate, attitude: None };
 /// let status = (0..50).map(|_| cascade.step(inputs()).unwrap().status.unwrap()).last().unwrap();
@@ -72,7 +72,7 @@ pub struct CascadeLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/CascadeState")]
 pub struct CascadeState {

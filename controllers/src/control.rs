@@ -37,7 +37,7 @@ pub struct ControlOutput {
 /// Outputs of the integrators of a law, in units that mean the same to all laws.
 ///
 /// They are accelerations, not integrals of an error, so that a backup with other gains goes on without a jump.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ControlIntegrals")]
 pub struct Integrals {

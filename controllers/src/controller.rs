@@ -7,10 +7,10 @@ use crate::control::ControlOutput;
 use crate::controller_state::ControllerState;
 use crate::law::{Law, LawContext};
 use crate::rehearsal;
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{ControlStatus, MotorCommand};
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{ControlStatus, MotorCommand};
+use component::{Component, Info, StepError};
 use diagnostics::ParameterError;
 use vehicles::Vehicle;
 use vehicles::reference::HUMMINGBIRD;
@@ -27,14 +27,14 @@ pub struct Outputs {
 /// A law that flies a vehicle.
 ///
 /// ```
-/// use bus::messages::{SetPoint, StateEstimate};
+/// use component::messages::{SetPoint, StateEstimate};
 /// use controllers::controller::Controller;
 /// use controllers::law_inputs::SetPointInputs;
 /// use controllers::pid::PidLaw;
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle });
-/// let mut pid = bus::Harness::<Controller<PidLaw>>::from_json(&parameters).unwrap();
+/// let mut pid = component::Harness::<Controller<PidLaw>>::from_json(&parameters).unwrap();
 /// let set_point = SetPoint { altitude: 1.0, ..Default::default() };
 /// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let inputs = SetPointInputs { set_point: &set_point, estimate: &estimate, attitude: None };

@@ -7,8 +7,8 @@
 use crate::allocation::RotorWrench;
 use crate::control::Integrals;
 use crate::law::Law;
-use bus::Message;
-use bus::random::{FNV_OFFSET, fnv1a};
+use component::Message;
+use component::random::{FNV_OFFSET, fnv1a};
 
 /// The most 64-bit words that a law's own state takes.
 const WORDS_MAX: usize = 32;

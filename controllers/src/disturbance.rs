@@ -21,7 +21,7 @@ gains! {
 }
 
 /// State of the observer.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ObserverState")]
 pub struct ObserverState {

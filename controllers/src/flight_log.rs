@@ -1,7 +1,7 @@
 //! A measured flight: rows of a CSV file, read by a column map that states every unit.
 
-use bus::Bounded;
-use bus::messages::PerRotor;
+use component::Bounded;
+use component::messages::PerRotor;
 use diagnostics::ParameterError;
 use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
 use inputs::InputFiles;
@@ -57,7 +57,7 @@ mod array {
 }
 
 /// The column map of a flight.
-#[derive(Clone, Debug, bus::Parameters)]
+#[derive(Clone, Debug, component::Parameters)]
 pub struct ColumnMap {
     /// Form of a file that does not show it.
     #[parameter(default = Dialect::default(), shown = "what the file shows")]

@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 const VELOCITY_MISSED_MAX_M_S: f64 = 1.0;
 
 /// State of a law that foresees.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/ForesightState")]
 pub struct ForesightState {

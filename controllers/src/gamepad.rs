@@ -3,7 +3,7 @@
 //! The kernel sends the position of each axis and button when the device is opened, and each change after that. No library is needed.
 
 use crate::pulses::{HIGH_US, LOW_US, check_channel, check_pulse};
-use bus::messages::RC_CHANNELS_MAX;
+use component::messages::RC_CHANNELS_MAX;
 use diagnostics::parameter::{ParameterError, refuse, require};
 use std::collections::BTreeSet;
 use std::fmt::Display;
@@ -33,7 +33,7 @@ const INPUT_MAJOR: u64 = 13;
 const JOYSTICK_MINORS: u64 = 32;
 
 /// Control of a gamepad that moves a channel.
-#[derive(Clone, Copy, Debug, bus::Parameters)]
+#[derive(Clone, Copy, Debug, component::Parameters)]
 pub(crate) struct Control {
     /// Number of the channel, from 1.
     #[parameter(check = check_channel)]
@@ -240,7 +240,7 @@ fn is_joystick(metadata: &Metadata) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Parameters as _;
+    use component::Parameters as _;
 
     fn control(text: &str) -> Control {
         let control: Control = toml::from_str(text).unwrap();

@@ -28,7 +28,7 @@ use crate::law_inputs::ReferenceInputs;
 use crate::motor_lag::Made;
 use crate::set_points::SetPoint;
 use crate::trajectory::Point;
-use bus::component::Info;
+use component::Info;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -36,12 +36,12 @@ use std::path::Path;
 /// The law at one period, with everything that does not change during a run.
 ///
 /// ```
-/// use bus::messages::{Reference, StateEstimate};
+/// use component::messages::{Reference, StateEstimate};
 /// use controllers::{controller::Controller, geometric::GeometricLaw, law_inputs::ReferenceInputs};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle });
-/// let mut law = bus::Harness::<Controller<GeometricLaw>>::from_json(&parameters).unwrap();
+/// let mut law = component::Harness::<Controller<GeometricLaw>>::from_json(&parameters).unwrap();
 /// let reference = Reference { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let inputs = ReferenceInputs { reference: &reference, estimate: &estimate, attitude: None };

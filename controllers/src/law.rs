@@ -3,10 +3,10 @@
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
 use crate::control::{ControlOutput, Integrals};
-use bus::Message;
-use bus::component::Info;
-use bus::context::NodeContext;
-use bus::ports::InputPorts;
+use component::Info;
+use component::Message;
+use component::context::NodeContext;
+use component::ports::InputPorts;
 use diagnostics::ParameterError;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub trait Law: Sized + Send {
     /// Its name in manifests, and its description.
     const INFO: Info;
     /// Parameters, as the manifest's `parameters` table holds them.
-    type Parameters: bus::Parameters;
+    type Parameters: component::Parameters;
     /// Inputs: ports of the law alone, `Option` for those that need not be wired. [`crate::law_inputs`] has some.
     type Inputs<'a>: InputPorts<'a>;
     /// State between ticks.
@@ -74,7 +74,7 @@ pub struct LawContext<'a> {
 }
 
 /// Parameters of a law that has no others.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct FileParameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

@@ -4,8 +4,8 @@
 
 use crate::control::{HoverMotion, MotionEstimate};
 use crate::set_points::SetPoint;
-use bus::InputPorts;
-use bus::messages::{
+use component::InputPorts;
+use component::messages::{
     AttitudeEstimate, Quaternion as QuaternionMessage, Reference, SetPoint as SetPointMessage, StateEstimate,
     Vector3 as VectorMessage, WallEstimate,
 };

@@ -21,7 +21,7 @@ use crate::motor_lag::Made;
 use crate::riccati;
 use crate::set_points::SetPoint;
 use crate::trajectory::Point;
-use bus::component::Info;
+use component::Info;
 use diagnostics::ParameterError;
 use nalgebra::{Rotation3, SMatrix, SVector, Vector3};
 use std::path::Path;
@@ -29,12 +29,12 @@ use std::path::Path;
 /// The law at one period, with everything that does not change during a run.
 ///
 /// ```
-/// use bus::messages::{Reference, StateEstimate};
+/// use component::messages::{Reference, StateEstimate};
 /// use controllers::{controller::Controller, lqr::LqrLaw, law_inputs::ReferenceInputs};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle });
-/// let mut law = bus::Harness::<Controller<LqrLaw>>::from_json(&parameters).unwrap();
+/// let mut law = component::Harness::<Controller<LqrLaw>>::from_json(&parameters).unwrap();
 /// let reference = Reference { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let inputs = ReferenceInputs { reference: &reference, estimate: &estimate, attitude: None };

@@ -11,7 +11,7 @@ use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
 use crate::pid_gains::PidGains;
 use crate::set_points::SetPoint;
-use bus::component::Info;
+use component::Info;
 use diagnostics::ParameterError;
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -42,7 +42,7 @@ pub struct PidLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/PidState")]
 pub struct PidState {
@@ -51,7 +51,7 @@ pub struct PidState {
 }
 
 /// Parameters of the PID controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

@@ -88,7 +88,7 @@ impl PidGains {
             Some(Value::String(path)) => Self::load(files, Some(path.as_ref())),
             Some(table) => {
                 let whole = Self::over_file(files, table)?;
-                let gains = bus::parameters::read(whole.as_ref().unwrap_or(table))
+                let gains = component::parameters::read(whole.as_ref().unwrap_or(table))
                     .and_then(|gains: Self| gains.check().map(|()| gains));
                 gains.map_err(|error| error.within("gains"))
             }

@@ -2,17 +2,17 @@
 
 use crate::set_points::{ALTITUDES_EXPECTED, ALTITUDES_M, Schedule, SetPoint as Values, SetPointEntry};
 use crate::sticks::Sticks;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::SetPoint;
-use bus::{FileKind, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::SetPoint;
+use component::{Component, Info, StepError};
+use component::{FileKind, OutputPorts};
 use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, refuse};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Parameters of the pilot.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Altitude until the first set point; the angles start at zero.
     #[parameter(example = "1.0")]
@@ -56,7 +56,7 @@ pub struct Outputs {
 ///
 /// let step = json!({ "kind": "step", "channel": "altitude", "at_s": 0.002, "to": 1.5, "unit": "m" });
 /// let parameters = json!({ "initial_altitude_m": 1.0, "set_points": [step] });
-/// let mut pilot = bus::Harness::<Pilot>::from_json(&parameters).unwrap();
+/// let mut pilot = component::Harness::<Pilot>::from_json(&parameters).unwrap();
 /// let asked_m = [0, 1, 2].map(|_| pilot.step(()).unwrap().set_point.altitude);
 /// assert_eq!(asked_m, [1.0, 1.0, 1.5]);
 /// ```
@@ -128,7 +128,7 @@ impl Pilot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Registration;
+    use component::Registration;
 
     fn pilot(more: &str) -> Result<Pilot, ParameterError> {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../manifests/sticks/roll.csv");

@@ -1,17 +1,17 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
 use crate::flight_log::{ColumnMap, FlightLog, Gap, Row};
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{MeasuredState, MotorCommand, Quaternion};
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{MeasuredState, MotorCommand, Quaternion};
+use component::{Component, Info, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 use inputs::{FileKind, InputFiles};
 use serde::Deserialize;
 use std::path::PathBuf;
 
 /// Parameters of the player.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// CSV file of the flight, relative to the manifest.
     #[parameter(file = FileKind::DATA)]
@@ -92,7 +92,7 @@ pub struct Outputs {
 /// ```
 /// use controllers::player::Player;
 ///
-/// let error = bus::Harness::<Player>::from_json(&serde_json::json!({ "data": "flight.csv" })).unwrap_err();
+/// let error = component::Harness::<Player>::from_json(&serde_json::json!({ "data": "flight.csv" })).unwrap_err();
 /// assert!(error.to_string().contains("columns"), "it has to know which columns hold what: {error}");
 /// ```
 #[derive(Debug)]

@@ -13,10 +13,10 @@
 use crate::angle::wrap_rad;
 use crate::set_points::SetPoint as Values;
 use crate::velocity::{along_heading, tilt_rad};
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{SetPoint, StateEstimate};
-use bus::{InputPorts, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{SetPoint, StateEstimate};
+use component::{Component, Info, StepError};
+use component::{InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, positive, up_to};
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -25,7 +25,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 ///
 /// The gains are tuned, no source, around `pid` with its built-in gains, whose attitude follows within 0.4 s: the velocity
 /// loop is to be slower than that, and the position loop slower than the velocity loop.
-#[derive(Debug, Clone, Copy, bus::Parameters)]
+#[derive(Debug, Clone, Copy, component::Parameters)]
 #[parameters(default)]
 pub struct Parameters {
     /// Error of the place to a velocity, Kx.
@@ -67,7 +67,7 @@ pub struct Outputs {
 }
 
 /// State of the position hold.
-#[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/PositionHoldState")]
 pub struct PositionHoldState {
@@ -82,10 +82,10 @@ pub struct PositionHoldState {
 /// The component `position-hold`.
 ///
 /// ```
-/// use bus::messages::{SetPoint, StateEstimate};
+/// use component::messages::{SetPoint, StateEstimate};
 /// use controllers::position_hold::{Inputs, PositionHold};
 ///
-/// let mut hold = bus::Harness::<PositionHold>::from_json(&serde_json::json!({})).unwrap();
+/// let mut hold = component::Harness::<PositionHold>::from_json(&serde_json::json!({})).unwrap();
 /// let mut asked = |roll: f64, x_m: f64| {
 ///     let estimate = StateEstimate { position: [x_m, 0.0, 1.0].into(), ..Default::default() };
 ///     hold.step(Inputs { set_point: &SetPoint { roll, ..Default::default() }, estimate: &estimate }).unwrap().set_point
@@ -198,7 +198,7 @@ fn yaw_rad(estimate: &StateEstimate) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
+    use component::Harness;
     use serde_json::json;
 
     fn hold() -> Harness<PositionHold> {
@@ -210,7 +210,7 @@ mod tests {
         let estimate = StateEstimate {
             position: [0.0, y_m, 1.0].into(),
             velocity: [0.0, v_m_s, 0.0].into(),
-            attitude: bus::messages::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w },
+            attitude: component::messages::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w },
             ..Default::default()
         };
         let set_point = SetPoint { altitude: 1.5, roll, ..Default::default() };

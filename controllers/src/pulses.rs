@@ -1,6 +1,6 @@
 //! Pulses of a remote control, and numbers of its channels.
 
-use bus::messages::RC_CHANNELS_MAX;
+use component::messages::RC_CHANNELS_MAX;
 use diagnostics::parameter::{ParameterError, require};
 use std::ops::RangeInclusive;
 

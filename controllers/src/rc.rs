@@ -5,10 +5,10 @@
 
 use crate::gamepad::{Control, Gamepad};
 use crate::pulses::{LOW_US, PULSES_US, check_channel, check_pulse};
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{RC_CHANNELS_MAX, RcChannels};
-use bus::{Bounded, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{RC_CHANNELS_MAX, RcChannels};
+use component::{Bounded, OutputPorts};
+use component::{Component, Info, StepError};
 use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, finite, not_negative, refuse};
 use inputs::{FileKind, InputFiles};
@@ -25,7 +25,7 @@ const MIDDLE_US: f64 = 1500.0;
 const STICKS: usize = 4;
 
 /// Parameters of `rc`.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Number of channels.
     #[parameter(shown = "the highest that is used, at least 4", range = format!("from the highest that is used to {RC_CHANNELS_MAX}"))]
@@ -48,7 +48,7 @@ pub struct Parameters {
 }
 
 /// Move of a channel.
-#[derive(Clone, Copy, Debug, bus::Parameters)]
+#[derive(Clone, Copy, Debug, component::Parameters)]
 struct Move {
     /// Number of the channel, from 1: roll, pitch, throttle, yaw, switches.
     #[parameter(check = check_channel)]
@@ -78,7 +78,7 @@ pub struct Outputs {
 ///     { "channel": 3, "at_s": 0.001, "pulse_us": 1400, "over_s": 0.002 },
 ///     { "channel": 5, "at_s": 0.0, "pulse_us": 2000 },
 /// ] });
-/// let mut rc = bus::Harness::<controllers::rc::Rc>::from_json(&parameters).unwrap();
+/// let mut rc = component::Harness::<controllers::rc::Rc>::from_json(&parameters).unwrap();
 /// let throttle_us = [0, 1, 2, 3, 4].map(|_| rc.step(()).unwrap().rc.pulse[2]);
 /// assert_eq!(throttle_us, [1000.0, 1000.0, 1200.0, 1400.0, 1400.0]);
 /// assert_eq!(rc.step(()).unwrap().rc.pulse, [1500.0, 1500.0, 1400.0, 1500.0, 2000.0]);
@@ -395,7 +395,7 @@ fn without_keys(cause: &TableError) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Parameters as _;
+    use component::Parameters as _;
 
     /// Warnings of `text`, with `files`.
     fn warnings(text: &str) -> Vec<String> {

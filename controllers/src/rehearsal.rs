@@ -8,9 +8,9 @@ use crate::bumpless::BumplessTransfer;
 use crate::control::{ControlOutput, MotionEstimate};
 use crate::controller_state::ControllerState;
 use crate::law::Law;
-use bus::context::NodeContext;
-use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
-use bus::{InputMemory, InputMessages};
+use component::context::NodeContext;
+use component::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
+use component::{InputMemory, InputMessages};
 use diagnostics::parameter::{ParameterError, refuse};
 use diagnostics::{digits, nine_decimals};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -154,9 +154,9 @@ mod tests {
     use crate::law::{FileParameters, LawContext, Predecessor};
     use crate::pid::{PidLaw, PidState};
     use crate::pid_gains::PidGains;
-    use bus::component::Info;
-    use bus::context::Warning;
-    use bus::messages::{Battery, Gps, PlantState, Quaternion};
+    use component::Info;
+    use component::context::Warning;
+    use component::messages::{Battery, Gps, PlantState, Quaternion};
     use std::path::Path;
     use vehicles::Vehicle;
 
@@ -210,7 +210,7 @@ mod tests {
     }
 
     /// Inputs that no other law has.
-    #[derive(Debug, bus::InputPorts)]
+    #[derive(Debug, component::InputPorts)]
     struct BatteryInputs<'a> {
         battery: &'a Battery,
         gps: Option<&'a Gps>,
@@ -251,7 +251,7 @@ mod tests {
     }
 
     /// An input with an attitude that no other law has.
-    #[derive(Debug, bus::InputPorts)]
+    #[derive(Debug, component::InputPorts)]
     struct TruthInputs<'a> {
         state: &'a PlantState,
     }

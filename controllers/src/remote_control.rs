@@ -7,10 +7,10 @@
 
 use crate::angle::wrap_rad;
 use crate::pulses::check_pulse;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
-use bus::{Bounded, InputPorts, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
+use component::{Bounded, InputPorts, OutputPorts};
+use component::{Component, Info, StepError};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -24,7 +24,7 @@ const LOW_US: f64 = 1000.0;
 const WHOLE_US: f64 = 1000.0;
 
 /// Parameters of the remote control.
-#[derive(Debug, Clone, bus::Parameters)]
+#[derive(Debug, Clone, component::Parameters)]
 pub struct Parameters {
     /// Angle of the firmware's angle mode at full stick.
     #[parameter(check = positive, example = "30.0")]
@@ -56,7 +56,7 @@ pub struct Parameters {
 }
 
 /// A switch that moves.
-#[derive(Debug, Clone, Copy, bus::Parameters)]
+#[derive(Debug, Clone, Copy, component::Parameters)]
 struct Switch {
     /// Its channel, counted from 1; the first four are the sticks.
     #[parameter(check = check_switch)]
@@ -93,7 +93,7 @@ pub struct Outputs {
 }
 
 /// State of the remote control.
-#[derive(Debug, Clone, Copy, Default, PartialEq, bus::Message)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RemoteControlState")]
 pub struct RemoteControlState {
@@ -105,12 +105,12 @@ pub struct RemoteControlState {
 /// The component `remote-control`.
 ///
 /// ```
-/// use bus::messages::{SetPoint, StateEstimate};
+/// use component::messages::{SetPoint, StateEstimate};
 /// use controllers::remote_control::{Inputs, RemoteControl};
 ///
 /// let parameters = serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4,
 ///     "switches": [{ "channel": 5, "at_s": 0.0, "pulse_us": 2000 }] });
-/// let mut sticks = bus::Harness::<RemoteControl>::from_json(&parameters).unwrap();
+/// let mut sticks = component::Harness::<RemoteControl>::from_json(&parameters).unwrap();
 /// let set_point = SetPoint { roll: 15_f64.to_radians(), ..Default::default() };
 /// let rc = sticks.step(Inputs { set_point: &set_point, estimate: &StateEstimate::default() }).unwrap().rc;
 /// assert_eq!(rc.pulse, [1750.0, 1500.0, 1400.0, 1500.0, 2000.0], "µs: half of the roll stick's way, hover, and the switch");
@@ -175,7 +175,7 @@ fn never_acting(switches: &[Switch]) -> Option<&Switch> {
 
 impl RemoteControl {
     fn yaw_rate_rad_s(&self, set_point: &SetPoint, estimate: &StateEstimate) -> f64 {
-        let bus::messages::Quaternion { x, y, z, w } = estimate.attitude;
+        let component::messages::Quaternion { x, y, z, w } = estimate.attitude;
         let (_, _, yaw_rad) = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).euler_angles();
         self.parameters.yaw_1_s * wrap_rad(set_point.yaw - yaw_rad)
     }
@@ -214,11 +214,11 @@ impl RemoteControl {
 mod tests {
     use super::*;
 
-    fn sticks(more: serde_json::Value) -> bus::Harness<RemoteControl> {
+    fn sticks(more: serde_json::Value) -> component::Harness<RemoteControl> {
         let mut parameters =
             serde_json::json!({ "tilt_max_deg": 30, "yaw_rate_max_deg_s": 90, "hover_throttle": 0.4 });
         parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        bus::Harness::from_json(&parameters).unwrap()
+        component::Harness::from_json(&parameters).unwrap()
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! same. A beam that shows another place is not believed, unless both show it together, which they do where they
 //! see both walls. With both beams blocked the place goes on by velocity alone.
 
-use bus::messages::WallEstimate;
+use component::messages::WallEstimate;
 
 /// A beam this far from where its wall should be sees something else, m. Tuned, no source: above the error that
 /// dead reckoning gathers along a side, below a vehicle's size and gap.

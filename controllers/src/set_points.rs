@@ -6,7 +6,7 @@
 //! zero, so that one of 1 s lasts 2 s as a whole. Pulses of half a second bring the Hummingbird to
 //! 9.1° and −8.8° only, behind its motors' lag (gains 16 and 6); with the thesis's 25 and 6, to 14.2° and −17.9°.
 
-use bus::messages::SetPoint as SetPointMessage;
+use component::messages::SetPoint as SetPointMessage;
 use diagnostics::ParameterError;
 use diagnostics::parameter::require;
 use diagnostics::unit::{ANGLE, Dimension};

@@ -2,7 +2,7 @@
 
 use crate::curve::{Curve, Path, PhaseClock, Shape, smooth_step};
 use crate::minimum_snap::{MinimumSnap, spans_at_mean_speed};
-use bus::messages::Reference;
+use component::messages::Reference;
 use diagnostics::parameter::{ParameterError, all, finite, positive, refuse, require};
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -117,7 +117,7 @@ impl Trajectory {
         let mut trajectory = Self { segments: Vec::with_capacity(entries.len()), end: start };
         let mut errors = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
-            let appended = bus::parameters::read(entry).and_then(|entry| trajectory.append(&entry));
+            let appended = component::parameters::read(entry).and_then(|entry| trajectory.append(&entry));
             let each = appended.err().map_or(Vec::new(), ParameterError::into_each);
             // Behind a faulty segment, nobody knows where a path begins.
             let is_of_path = |error: &ParameterError| ["waypoints_m", "times_s"].contains(&error.key());

@@ -1,15 +1,15 @@
 //! The trajectory node: publishes the points of a trajectory, with the derivatives that controllers feed forward.
 
 use crate::trajectory::{Point, Start, Trajectory};
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{Orientation, PlannedPath, Pose, Reference, Time};
-use bus::ports::OutputNumber;
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{Orientation, PlannedPath, Pose, Reference, Time};
+use component::ports::OutputNumber;
+use component::{Component, Info, StepError};
 use diagnostics::ParameterError;
 
 /// Parameters of the trajectory.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Position at its start, in the world.
     #[parameter(example = "[0.0, 0.0, 1.0]")]
@@ -56,7 +56,7 @@ const POSE_EVERY_NS: u64 = 100_000_000;
 ///
 /// let circle = json!({ "kind": "circle", "radius_m": 2.0, "speed_m_s": 2.0, "laps": 2, "ramp_s": 2.0 });
 /// let parameters = json!({ "initial_position_m": [0.0, 0.0, 1.0], "segments": [circle] });
-/// let mut trajectory = bus::Harness::<TrajectoryNode>::from_json(&parameters).unwrap();
+/// let mut trajectory = component::Harness::<TrajectoryNode>::from_json(&parameters).unwrap();
 /// let reference = trajectory.step(()).unwrap().reference;
 /// assert_eq!((reference.position.z, reference.velocity.x), (1.0, 0.0), "it starts from rest");
 /// ```
@@ -82,7 +82,7 @@ fn pose(point: &Point) -> Pose {
     let [x, y, z] = <[f64; 3]>::from(point.path_W[0]);
     let (sine, cosine) = libm::sincos(0.5 * point.yaw_rad);
     Pose {
-        position: bus::messages::Point { x, y, z },
+        position: component::messages::Point { x, y, z },
         orientation: Orientation { x: 0.0, y: 0.0, z: sine, w: cosine },
     }
 }
@@ -122,8 +122,8 @@ impl Component for TrajectoryNode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
-    use bus::sample_ticks::SampleTicks;
+    use component::Harness;
+    use component::sample_ticks::SampleTicks;
     use serde_json::json;
 
     #[test]

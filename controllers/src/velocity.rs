@@ -15,8 +15,8 @@ use crate::gains_file::Table;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::VelocityInputs;
 use crate::set_points::SetPoint;
-use bus::component::Info;
-use bus::messages::Reference;
+use component::Info;
+use component::messages::Reference;
 use diagnostics::parameter::{ParameterError, finite, refuse};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PURE_NUMBER, TIME, VELOCITY};
 use std::path::{Path, PathBuf};
@@ -75,7 +75,7 @@ pub struct VelocitySetPoint {
 }
 
 /// State of the velocity loops and of the law around them.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/VelocityState")]
 pub struct VelocityState {
@@ -205,12 +205,12 @@ pub(crate) fn tilt_rad(acceleration_m_s2: &[f64; 2], gravity_m_s2: f64) -> (f64,
 /// The controller `velocity`: a reference's velocity, or a constant one.
 ///
 /// ```
-/// use bus::messages::StateEstimate;
+/// use component::messages::StateEstimate;
 /// use controllers::{controller::Controller, law_inputs::VelocityInputs, velocity::VelocityLaw};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "velocity_m_s": [1.0, 0.0] });
-/// let mut velocity = bus::Harness::<Controller<VelocityLaw>>::from_json(&parameters).unwrap();
+/// let mut velocity = component::Harness::<Controller<VelocityLaw>>::from_json(&parameters).unwrap();
 /// let estimate = StateEstimate { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let inputs = || VelocityInputs { estimate: &estimate, attitude: None, reference: None };
 /// let status = (0..50).map(|_| velocity.step(inputs()).unwrap().status.unwrap()).last().unwrap();
@@ -238,7 +238,7 @@ impl VelocityLaw {
 }
 
 /// Parameters of the velocity controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

@@ -22,8 +22,8 @@ use crate::law_inputs::WallInputs;
 use crate::legs::{self, Beam, Leg};
 use crate::room::Room;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
-use bus::component::Info;
-use bus::messages::WallEstimate;
+use component::Info;
+use component::messages::WallEstimate;
 use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, finite, positive, refuse, require, up_to, within};
 use diagnostics::unit::{ACCELERATION, PER_SECOND, PER_SECOND_3, VELOCITY};
@@ -76,12 +76,12 @@ pub struct Shared {
 /// The law.
 ///
 /// ```
-/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use component::messages::{AttitudeEstimate, WallEstimate};
 /// use controllers::{controller::Controller, law_inputs::WallInputs, wall_follow::WallFollowLaw};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "mode": "constant" });
-/// let mut law = bus::Harness::<Controller<WallFollowLaw>>::from_json(&parameters).unwrap();
+/// let mut law = component::Harness::<Controller<WallFollowLaw>>::from_json(&parameters).unwrap();
 /// let walls = WallEstimate { distance: [5.0; 4], in_sight: [1; 4], height: 1.0, ..Default::default() };
 /// let inputs = WallInputs { walls: &walls, attitude: &AttitudeEstimate::default() };
 /// let status = law.step(inputs).unwrap().status.unwrap();
@@ -110,7 +110,7 @@ pub struct WallFollowLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallFollowState")]
 pub struct WallFollowState {
@@ -131,7 +131,7 @@ pub struct WallFollowState {
 }
 
 /// Parameters of the wall-follow controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

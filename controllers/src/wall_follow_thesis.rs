@@ -18,7 +18,7 @@ use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::legs::{self, Beam, Leg};
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
-use bus::component::Info;
+use component::Info;
 use diagnostics::parameter::{ParameterError, finite, positive, refuse, up_to, within};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -45,12 +45,12 @@ pub enum Ahead {
 /// The law.
 ///
 /// ```
-/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use component::messages::{AttitudeEstimate, WallEstimate};
 /// use controllers::{controller::Controller, law_inputs::WallInputs, wall_follow_thesis::WallFollowThesisLaw};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "mode": "constant", "speed_m_s": 0.5 });
-/// let mut law = bus::Harness::<Controller<WallFollowThesisLaw>>::from_json(&parameters).unwrap();
+/// let mut law = component::Harness::<Controller<WallFollowThesisLaw>>::from_json(&parameters).unwrap();
 /// let mut asked_m_s = |ahead_m: f64| {
 ///     let walls = WallEstimate { distance: [ahead_m, 5.0, 5.0, 5.0], in_sight: [1; 4], ..Default::default() };
 ///     let status = law.step(WallInputs { walls: &walls, attitude: &AttitudeEstimate::default() }).unwrap().status;
@@ -78,7 +78,7 @@ pub struct WallFollowThesisLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallFollowThesisState")]
 pub struct WallFollowThesisState {
@@ -101,7 +101,7 @@ enum Mode {
 }
 
 /// Parameters of the thesis's wall-follow controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

@@ -17,7 +17,7 @@ use crate::control::ControlOutput;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
-use bus::component::Info;
+use component::Info;
 use diagnostics::parameter::{ParameterError, finite, positive, up_to};
 use diagnostics::unit::{ACCELERATION, LENGTH, PER_SECOND, PER_SECOND_3, TIME, VELOCITY};
 use std::path::{Path, PathBuf};
@@ -62,12 +62,12 @@ gains! {
 /// The law.
 ///
 /// ```
-/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use component::messages::{AttitudeEstimate, WallEstimate};
 /// use controllers::{controller::Controller, law_inputs::WallInputs, wall_stop::{HOLDING, WallStopLaw}};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0 });
-/// let mut law = bus::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
+/// let mut law = component::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
 /// let walls = WallEstimate { distance: [3.0; 4], in_sight: [1; 4], height: 1.0, ..Default::default() };
 /// let inputs = WallInputs { walls: &walls, attitude: &AttitudeEstimate::default() };
 /// assert_eq!(law.step(inputs).unwrap().status.unwrap().state, HOLDING, "it rests 3 m before the wall");
@@ -89,7 +89,7 @@ pub struct WallStopLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallStopState")]
 pub struct WallStopState {
@@ -110,7 +110,7 @@ pub struct WallStopState {
 }
 
 /// Parameters of the wall-stop controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]
@@ -268,14 +268,14 @@ mod tests {
         use crate::controller::Controller;
         let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
         let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0 });
-        let mut law = bus::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
-        let mut walls = bus::messages::WallEstimate {
+        let mut law = component::Harness::<Controller<WallStopLaw>>::from_json(&parameters).unwrap();
+        let mut walls = component::messages::WallEstimate {
             distance: [3.0; 4],
             in_sight: [1; 4],
             height: 1.0,
             ..Default::default()
         };
-        let attitude = bus::messages::AttitudeEstimate::default();
+        let attitude = component::messages::AttitudeEstimate::default();
         let mut fly = |aside_m_s: f64, steps: u32| {
             walls.velocity[1] = aside_m_s;
             let inputs = || WallInputs { walls: &walls, attitude: &attitude };

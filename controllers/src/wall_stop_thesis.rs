@@ -15,7 +15,7 @@ use crate::free_flight::FreeFlight;
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::WallInputs;
 use crate::velocity::{LoopsGains, VelocityLoop, VelocitySetPoint, VelocityState};
-use bus::component::Info;
+use component::Info;
 use diagnostics::parameter::{ParameterError, finite, positive, up_to};
 use diagnostics::unit::PER_SECOND_2;
 use std::path::{Path, PathBuf};
@@ -40,13 +40,13 @@ gains! {
 /// The law.
 ///
 /// ```
-/// use bus::messages::{AttitudeEstimate, WallEstimate};
+/// use component::messages::{AttitudeEstimate, WallEstimate};
 /// use controllers::{controller::Controller, law_inputs::WallInputs, wall_stop_thesis::WallStopThesisLaw};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "altitude_m": 1.0, "pitch_deg": 1.0 });
 /// let pitch_deg = |distance_m: f64| {
-///     let mut law = bus::Harness::<Controller<WallStopThesisLaw>>::from_json(&parameters).unwrap();
+///     let mut law = component::Harness::<Controller<WallStopThesisLaw>>::from_json(&parameters).unwrap();
 ///     let walls = WallEstimate { distance: [distance_m; 4], in_sight: [1; 4], height: 1.0, ..Default::default() };
 ///     let attitude = AttitudeEstimate::default();
 ///     let status = (0..2000).map(|_| law.step(WallInputs { walls: &walls, attitude: &attitude }).unwrap().status);
@@ -73,7 +73,7 @@ pub struct WallStopThesisLaw {
 }
 
 /// State of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/WallStopThesisState")]
 pub struct WallStopThesisState {
@@ -88,7 +88,7 @@ pub struct WallStopThesisState {
 }
 
 /// Parameters of the thesis's wall-stop controller.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

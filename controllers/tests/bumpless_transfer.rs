@@ -6,7 +6,7 @@
 
 use crate::flight;
 use crate::skipped::cases;
-use bus::messages::Vector3 as Point;
+use component::messages::Vector3 as Point;
 use controllers::allocation::RotorWrench;
 use controllers::cascade::CascadeLaw;
 use controllers::cascade_gains::CascadeGains;

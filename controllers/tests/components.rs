@@ -1,8 +1,8 @@
 //! Parameters that the controllers and the pilot accept and refuse before a start, and that the documentation
 //! says so.
 
-use bus::Registration;
-use bus::context::NodeContext;
+use component::Registration;
+use component::context::NodeContext;
 use controllers::cascade::CascadeLaw;
 use controllers::controller::Controller;
 use controllers::pid::PidLaw;

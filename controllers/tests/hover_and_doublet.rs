@@ -1,7 +1,7 @@
 //! The thesis's first scenario (Figs 5.1–5.5) in a closed loop: hover from 1.0 to 1.5 m at 2 s, then a roll
 //! doublet of ±10° at 6 s. A noisy IMU and the complementary filter are between plant and law.
 
-use bus::messages::AttitudeEstimate;
+use component::messages::AttitudeEstimate;
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
 use controllers::pid::PidLaw;

@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use crate::skipped::cases;
-use bus::messages::PerRotor;
+use component::messages::PerRotor;
 use controllers::airframe::ControlledVehicle;
 use controllers::control::{HoverMotion, Integrals};
 use controllers::pid::PidLaw;

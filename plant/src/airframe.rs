@@ -127,7 +127,7 @@ impl Airframe {
     /// whose seed is `seed`.
     #[must_use]
     pub fn initial_state(&self, seed: u64, node: &str, dt_s: f64) -> AirframeState {
-        let random = |kind: &str| bus::random::stream(seed, &format!("{node}/{kind}"));
+        let random = |kind: &str| component::random::stream(seed, &format!("{node}/{kind}"));
         let state = |kind: &str| EffectState::new(kind, random(kind), self.vehicle.rotors.len());
         AirframeState {
             actuation: Actuation::none(self.vehicle.rotors.len()),

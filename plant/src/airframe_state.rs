@@ -6,7 +6,7 @@
 use crate::actuation::Actuation;
 use crate::saved::{Fingerprint, Reader, STREAM_BYTES, Saved, Unfit, Writer, saved_fields};
 use crate::state::{PerRotor, paired};
-use bus::random::{Stream, normal};
+use component::random::{Stream, normal};
 
 /// State of an airframe's effects from tick to tick; made by
 /// [`Airframe::initial_state`](crate::Airframe::initial_state). Only its making allocates.

@@ -3,7 +3,7 @@
 use crate::backend::Backend;
 use crate::newton_euler::NewtonEuler;
 use crate::state::{PerRotor, RigidBody, State};
-use bus::context::NodeContext;
+use component::context::NodeContext;
 use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, refuse};
 use diagnostics::unit::MASS;
@@ -232,7 +232,7 @@ fn first_not_finite(backend: &dyn Backend) -> Option<&'static str> {
 mod tests {
     use super::*;
     use crate::{Airframe, FreeFlight, NewtonEuler};
-    use bus::context::Warning;
+    use component::context::Warning;
     use nalgebra::Vector3;
 
     const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");

@@ -112,7 +112,7 @@ pub struct Neighbour {
     pub velocity_W_m_s: Vector3<f64>,
 }
 
-/// Contacts of the vehicle; `bus::messages::Contact` describes each field.
+/// Contacts of the vehicle; `component::messages::Contact` describes each field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactReport {
     /// Sum of the contact forces over the last tick.

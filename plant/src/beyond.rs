@@ -2,7 +2,7 @@
 
 use crate::effects::{Effect, WIND};
 use crate::state::RigidBody;
-use bus::context::NodeContext;
+use component::context::NodeContext;
 use nalgebra::Vector3;
 use vehicles::Vehicle;
 

@@ -192,7 +192,7 @@ impl Rapier {
     }
 
     /// The numbers of the first two of the scene's bodies, things and the vehicle that start inside of each other, as
-    /// `bus::messages::Contact` counts them: 0 is the vehicle.
+    /// `component::messages::Contact` counts them: 0 is the vehicle.
     pub(crate) fn overlap(&mut self) -> Option<[u32; 2]> {
         let Motion { world, system, .. } = &mut self.motion;
         world.overlap(&system.state.body, &system.free_bodies.states)

@@ -4,7 +4,7 @@ use crate::backend::{Backend, CONFIGURATION};
 use crate::others::Others;
 use crate::saved::{Reader, Saved, Writer};
 use crate::snapshot::SnapshotError;
-use bus::component::{State, StateError, Transfer};
+use component::{State, StateError, Transfer};
 
 /// Name of the state's type.
 const TYPE_NAME: &str = "PlantMemory";

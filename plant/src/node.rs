@@ -11,10 +11,12 @@ use crate::others::OthersError;
 use crate::output::{Outputs, actuators};
 use crate::parameters::{Parameters, unequal};
 use crate::state::RigidBody;
-use bus::InputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame};
+use component::InputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{
+    self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame,
+};
+use component::{Component, Info, StepError};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -32,12 +34,12 @@ pub struct Inputs<'a> {
 /// The plant: its vehicle, and the physics that moves it.
 ///
 /// ```
-/// use bus::messages::MotorCommand;
+/// use component::messages::MotorCommand;
 /// use plant::node::{Inputs, Plant};
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "initial_position_m": [0.0, 0.0, 1.0] });
-/// let mut plant = bus::Harness::<Plant>::from_json(&parameters).unwrap();
+/// let mut plant = component::Harness::<Plant>::from_json(&parameters).unwrap();
 /// let command = MotorCommand { command: [0.0; 4].into(), ..MotorCommand::default() };
 /// let inputs = || Inputs { command: &command, measured: None, traffic: None };
 /// let state = (0..=100).map(|_| plant.step(inputs()).unwrap().state).last().unwrap();
@@ -190,8 +192,8 @@ fn body(vectors: [messages::Vector3; 3], q: messages::Quaternion) -> RigidBody {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Registration;
-    use bus::context::InputMessage;
+    use component::Registration;
+    use component::context::InputMessage;
     use serde_json::{Value, json};
 
     fn repository(file: &str) -> String {
@@ -292,7 +294,7 @@ mod tests {
         let step = |command: &[f64]| {
             let command = MotorCommand { command: command.iter().copied().collect(), ..Default::default() };
             let inputs = Inputs { command: &command, measured: None, traffic: None };
-            let mut plant = bus::Harness::<Plant>::from_json(&parameters).unwrap();
+            let mut plant = component::Harness::<Plant>::from_json(&parameters).unwrap();
             plant.step(inputs).map(|outputs| outputs.state.rotor_speed.len())
         };
         assert_eq!(step(&[76.5; 4]).unwrap(), 4);

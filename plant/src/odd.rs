@@ -4,7 +4,7 @@ use crate::airframe::Airframe;
 use crate::airworthy::places;
 use crate::arms::{longest_arm, longest_arm_m};
 use crate::effects::{Effect, Quantity};
-use bus::context::NodeContext;
+use component::context::NodeContext;
 use diagnostics::digits;
 use vehicles::{MotorModel, Rotor, Vehicle};
 

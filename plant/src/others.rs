@@ -2,7 +2,7 @@
 
 use crate::backend::{Neighbour, TRAFFIC_MAX};
 use crate::saved::{Reader, Saved, Unfit, Writer};
-use bus::messages::{Time, Traffic};
+use component::messages::{Time, Traffic};
 use nalgebra::Vector3;
 
 /// The other vehicles of the run.

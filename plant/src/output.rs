@@ -2,9 +2,9 @@
 
 use crate::backend::Backend;
 use crate::state::RigidBody;
-use bus::OutputPorts;
-use bus::context::StepContext;
-use bus::messages::{
+use component::OutputPorts;
+use component::context::StepContext;
+use component::messages::{
     Actuators, Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState,
     Point, Pose, PoseStamped, Quaternion,
 };
@@ -133,7 +133,7 @@ fn bodies(backend: &dyn Backend) -> BodyStates {
     states
 }
 
-fn vector(v: &Vector3<f64>) -> bus::messages::Vector3 {
+fn vector(v: &Vector3<f64>) -> component::messages::Vector3 {
     <[f64; 3]>::from(*v).into()
 }
 

@@ -9,7 +9,7 @@ use crate::newton_euler::NewtonEuler;
 use crate::odd;
 use crate::origin::{Origin, Physics};
 use crate::state::RigidBody;
-use bus::context::NodeContext;
+use component::context::NodeContext;
 use diagnostics::parameter::{ParameterError, finite, positive, refuse, within};
 use diagnostics::{Diagnostic, nine_decimals};
 use inputs::InputFiles;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use vehicles::{EffectEntry, Vehicle};
 
 /// Parameters of the plant.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]

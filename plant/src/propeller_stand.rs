@@ -9,11 +9,11 @@ use crate::airworthy;
 use crate::motor;
 use crate::rotor::{drag_torque_N_m, thrust_N};
 use crate::state::RotorState;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::Time;
-use bus::random::{self, Stream, normal, stream};
-use bus::{Message, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::Time;
+use component::random::{self, Stream, normal, stream};
+use component::{Component, Info, StepError};
+use component::{Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, refuse, require};
 use std::f64::consts::PI;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ use vehicles::{CommandMap, Vehicle};
 const WORDS_PER_TICK: u128 = 1 << 10;
 
 /// Parameters of the stand.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]
@@ -47,7 +47,7 @@ pub struct Parameters {
 }
 
 /// Change of the commanded speed.
-#[derive(Debug, Clone, Copy, bus::Parameters)]
+#[derive(Debug, Clone, Copy, component::Parameters)]
 pub struct SpeedEntry {
     /// Start of the change; not before the change ahead of it is over.
     at_s: f64,
@@ -111,7 +111,7 @@ pub struct Outputs {
 ///
 /// let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../vehicles/hummingbird.toml");
 /// let parameters = json!({ "vehicle": vehicle, "speeds": [{ "at_s": 0.0, "to_rpm": 3900.0 }] });
-/// let mut stand = bus::Harness::<PropellerStand>::from_json(&parameters).unwrap();
+/// let mut stand = component::Harness::<PropellerStand>::from_json(&parameters).unwrap();
 /// let load = (0..=3000).map(|_| stand.step(()).unwrap().load).last().unwrap();
 /// assert!((load.thrust - 1.1588).abs() < 1e-3 && (load.drag_torque - 0.0408).abs() < 1e-4, "{load:?}");
 /// assert!(load.mount_torque > 0.0, "the clockwise front rotor turns its mount counter-clockwise: {load:?}");
@@ -278,7 +278,7 @@ fn leg(entry: &SpeedEntry, map: &CommandMap, dt_s: f64) -> Result<Leg, Parameter
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
+    use component::Harness;
     use serde_json::{Value, json};
 
     /// Mean and standard deviation.

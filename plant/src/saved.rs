@@ -1,6 +1,6 @@
 //! State as bytes: fields of fixed width in a fixed order, written and read without allocation.
 
-use bus::random::Stream;
+use component::random::Stream;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A part of a state that is written as bytes and read back.
@@ -178,7 +178,7 @@ impl<T: Saved, const N: usize> Saved for [T; N] {
 }
 
 /// The values that there are: their count follows from the configuration.
-impl<T: Saved, const N: usize> Saved for bus::Bounded<T, N> {
+impl<T: Saved, const N: usize> Saved for component::Bounded<T, N> {
     fn size(&self) -> usize {
         self.iter().map(T::size).sum()
     }
@@ -341,7 +341,7 @@ impl<T: Saved + Copy + Default> Saved for Bounded<T> {
 /// `hash` with a `name`.
 fn hashed(hash: u64, name: &str) -> u64 {
     // No name has the byte 255, so that no two names are taken for one.
-    bus::random::fnv1a(&[255], bus::random::fnv1a(name.as_bytes(), hash))
+    component::random::fnv1a(&[255], component::random::fnv1a(name.as_bytes(), hash))
 }
 
 /// Hash of a configuration: it is saved, and the state of another configuration is refused.
@@ -351,7 +351,7 @@ pub(crate) struct Fingerprint(u64);
 impl Fingerprint {
     /// The fingerprint of parts with these `names`.
     pub(crate) fn of<'n>(names: impl Iterator<Item = &'n str>) -> Self {
-        Self(names.fold(bus::random::FNV_OFFSET, hashed))
+        Self(names.fold(component::random::FNV_OFFSET, hashed))
     }
 
     /// The same, and those of parts with these `names`.
@@ -361,7 +361,7 @@ impl Fingerprint {
 
     /// The same, and these `numbers`.
     pub(crate) fn with(self, numbers: impl Iterator<Item = f64>) -> Self {
-        let hash = |hash, number: f64| bus::random::fnv1a(&number.to_bits().to_le_bytes(), hash);
+        let hash = |hash, number: f64| component::random::fnv1a(&number.to_bits().to_le_bytes(), hash);
         Self(numbers.fold(self.0, hash))
     }
 
@@ -394,7 +394,7 @@ impl Saved for Fingerprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::random::{normal, stream};
+    use component::random::{normal, stream};
 
     fn saved(part: &impl Saved) -> Vec<u8> {
         let mut bytes = vec![0xaa; part.size()];

@@ -1,7 +1,7 @@
 //! The state that the integrator moves: one rigid body and its rotors, in SI units.
 
 use crate::saved::saved_fields;
-use bus::Bounded;
+use component::Bounded;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use vehicles::ROTORS_MAX;
 
@@ -37,7 +37,7 @@ pub struct RigidBody {
 /// ```
 pub type PerRotor<T> = Bounded<T, ROTORS_MAX>;
 
-const _: () = assert!(ROTORS_MAX == bus::messages::ROTORS_MAX, "messages have room for all rotors");
+const _: () = assert!(ROTORS_MAX == component::messages::ROTORS_MAX, "messages have room for all rotors");
 
 /// One rotor's speed relative to the body, positive in the rotor's own sense of rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

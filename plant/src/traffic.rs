@@ -1,28 +1,28 @@
 //! The traffic: gathers where the vehicles of a run are into one sample, for those that share a room.
 
 use crate::backend::TRAFFIC_MAX;
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{PlantState, Traffic as Gathered};
-use bus::ports::Many;
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{PlantState, Traffic as Gathered};
+use component::ports::Many;
+use component::{Component, Info, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 
 /// Gathers the states of the plants of a run.
 ///
 /// ```
-/// use bus::context::NodeContext;
+/// use component::context::NodeContext;
 /// use plant::traffic::Traffic;
 ///
 /// let context = NodeContext::new("traffic", &["one", "two"]);
 /// let parameters = serde_json::from_str("{}").unwrap();
-/// assert!(bus::Harness::<Traffic>::in_context(parameters, &context).is_ok(), "up to 32 vehicles");
+/// assert!(component::Harness::<Traffic>::in_context(parameters, &context).is_ok(), "up to 32 vehicles");
 /// ```
 #[derive(Debug)]
 pub struct Traffic;
 
 /// Parameters of the traffic: none.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {}
 
 /// Outputs of the traffic.
@@ -67,7 +67,7 @@ impl Component for Traffic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
+    use component::Harness;
 
     #[test]
     fn as_many_as_a_message_holds_share_a_room_and_no_more() {

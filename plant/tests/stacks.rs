@@ -3,8 +3,8 @@
 
 use crate::common;
 use crate::skipped::{cases, first, quick_or};
-use bus::random::{stream, uniform};
 use common::{G_M_S2, TICK_S, bodies_energy_J, hummingbird};
+use component::random::{stream, uniform};
 use nalgebra::Vector3;
 use plant::{Backend, NewtonEuler, Rapier, RigidBody};
 use scenes::Scene;

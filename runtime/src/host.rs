@@ -176,7 +176,7 @@ impl Thread {
         let thread = std::thread::Builder::new().name(name.clone()).stack_size(STACK_BYTES);
         let handle = thread.spawn(move || match part {
             ThreadPart::Clock => bus::clock::run(join),
-            ThreadPart::Node(component) => component.run(join, components),
+            ThreadPart::Node(component) => bus::run_component(component, join, components),
             ThreadPart::Group => bus::group::run(&join, components),
         });
         let handle = handle.with_context(|| format!("process `{name}`: cannot start a thread"))?;

@@ -85,9 +85,8 @@ pub fn node(name: &str, registry: Registry) -> Result<()> {
     let ended = match (name, registry.find(name)) {
         ("clock", _) => Join::clock_from_environment().and_then(bus::clock::run),
         ("group", None) => bus::group::run_process(registry.components()),
-        (_, Some(component)) => {
-            Join::from_environment().and_then(|join| component.run(join, registry.components()))
-        }
+        (_, Some(component)) => Join::from_environment()
+            .and_then(|join| bus::run_component(component, join, registry.components())),
         (_, None) if let Some(program) = registry.program(name) => (program.run)(registry.components()),
         (_, None) => return Err(anyhow!("no kind `{name}`; there are {}", registry.names()).into()),
     };

@@ -10,9 +10,9 @@ use crate::channel::Chance;
 use crate::noise::BiasWalk;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
-use bus::component::Info;
-use bus::messages::Barometer;
-use bus::random::normal;
+use component::Info;
+use component::messages::Barometer;
+use component::random::normal;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use inputs::InputFiles;
 
@@ -31,11 +31,11 @@ timed_parameters! {
     /// warming (tuned, no source). The bias starts at zero: an autopilot nulls its altitude before take-off.
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::barometer::BarometerParams;
     /// use sensors::sensing::{Sensing, TruthInputs};
     ///
-    /// let mut barometer = bus::Harness::<Sensing<BarometerParams>>::new(BarometerParams::default()).unwrap();
+    /// let mut barometer = component::Harness::<Sensing<BarometerParams>>::new(BarometerParams::default()).unwrap();
     /// let state = PlantState { position: [0.0, 0.0, 100.0].into(), ..Default::default() };
     /// let read = (0..=16).map(|_| barometer.step(TruthInputs { state: &state }).unwrap().barometer).last().unwrap();
     /// assert!((read.altitude - 100.0).abs() < 1.0, "after its delay of 16 ms it tells the height: {read:?}");
@@ -108,8 +108,8 @@ impl Sensor for BarometerParams {
 mod tests {
     use super::*;
     use crate::testing::{harness, refusal, require_normal};
-    use bus::Harness;
-    use bus::messages::PlantState;
+    use component::Harness;
+    use component::messages::PlantState;
 
     fn perfect() -> BarometerParams {
         let (noise_Pa, bias_walk_Pa_sqrt_s, resolution_Pa) = (0.0, 0.0, 0.0);

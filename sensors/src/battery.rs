@@ -8,10 +8,10 @@
 use crate::channel::Chance;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
-use bus::InputPorts;
-use bus::component::Info;
-use bus::messages::Battery;
-use bus::random::normal;
+use component::Info;
+use component::InputPorts;
+use component::messages::Battery;
+use component::random::normal;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use inputs::InputFiles;
 
@@ -23,12 +23,12 @@ timed_parameters! {
     /// source. The capacity is the Hummingbird's (thesis, Table 2.1: 2100 mAh).
     ///
     /// ```
-    /// use bus::messages::Battery;
+    /// use component::messages::Battery;
     /// use sensors::battery::{BatteryInputs, BatteryParams};
     /// use sensors::sensing::Sensing;
     ///
     /// let parameters = BatteryParams { delay_ms: 0.0, ..BatteryParams::default() };
-    /// let mut monitor = bus::Harness::<Sensing<BatteryParams>>::new(parameters).unwrap();
+    /// let mut monitor = component::Harness::<Sensing<BatteryParams>>::new(parameters).unwrap();
     /// let battery = Battery { voltage: 11.1, current: 8.0, valid: 1, ..Default::default() };
     /// let read = monitor.step(BatteryInputs { battery: &battery }).unwrap().measured;
     /// assert!((read.voltage - 11.1).abs() < 0.01 && (read.current - 8.0).abs() < 0.01, "{read:?}");
@@ -131,7 +131,7 @@ impl Sensor for BatteryParams {
 mod tests {
     use super::*;
     use crate::testing::{harness, refusal, require_normal};
-    use bus::Harness;
+    use component::Harness;
 
     fn truth() -> Battery {
         Battery { voltage: 11.3, current: 8.4, charge: 0.5, valid: 1, ..Default::default() }

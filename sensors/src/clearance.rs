@@ -3,10 +3,10 @@
 
 use crate::cone::{caster, check_bodies, check_told};
 use crate::wire::body_poses;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{BodyStates, Clearance, PlantState, Vector3 as VectorMessage};
-use bus::{InputPorts, Message, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{BodyStates, Clearance, PlantState, Vector3 as VectorMessage};
+use component::{Component, Info, StepError};
+use component::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative};
 use nalgebra::Vector3;
 use scenes::{BodyPose, RayCaster};
@@ -20,7 +20,7 @@ const REACH_M: f64 = 1000.0;
 const MIDDLE_M: f64 = 0.5;
 
 /// Parameters of the clearance node.
-#[derive(Debug, Clone, PartialEq, bus::Parameters)]
+#[derive(Debug, Clone, PartialEq, component::Parameters)]
 #[parameters(default)]
 pub struct Parameters {
     /// Scene file, relative to the manifest.
@@ -66,12 +66,12 @@ pub struct Outputs {
 /// The component `clearance`.
 ///
 /// ```
-/// use bus::messages::PlantState;
+/// use component::messages::PlantState;
 /// use sensors::clearance::{ClearanceJudge, Inputs};
 ///
 /// let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
 /// let parameters = serde_json::json!({ "scene": scene });
-/// let mut judge = bus::Harness::<ClearanceJudge>::from_json(&parameters).unwrap();
+/// let mut judge = component::Harness::<ClearanceJudge>::from_json(&parameters).unwrap();
 /// let state = PlantState { position: [0.0, 0.0, 1.0].into(), ..Default::default() };
 /// let clearance = judge.step(Inputs { state: &state, bodies: None }).unwrap().clearance;
 /// assert!(clearance.nearest > 0.0 && clearance.nearest <= clearance.wall[0], "{clearance:?}");

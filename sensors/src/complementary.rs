@@ -22,11 +22,11 @@
 
 use crate::imu_model::ImuReading;
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::Parameters as _;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{AttitudeEstimate, Imu, Quaternion, Vector3 as VectorMessage};
-use bus::{InputPorts, Message, OutputPorts};
+use component::Parameters as _;
+use component::context::{NodeContext, StepContext};
+use component::messages::{AttitudeEstimate, Imu, Quaternion, Vector3 as VectorMessage};
+use component::{Component, Info, StepError};
+use component::{InputPorts, Message, OutputPorts};
 use diagnostics::parameter::{ParameterError, not_negative, positive, within};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -35,7 +35,7 @@ use std::f64::consts::{PI, TAU};
 const PITCH_BLEND_MAX_RAD: f64 = 1.4;
 
 /// Parameters of the filter: its trust in the accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[derive(Debug, Clone, Copy, PartialEq, component::Parameters)]
 #[parameters(default)]
 pub struct ComplementaryParams {
     /// Time constant with which roll and pitch follow the accelerometer.

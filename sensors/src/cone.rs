@@ -6,9 +6,9 @@
 //! 0.09 h² of its distance too far: 0.07 % at 5°. Vehicles are spheres, whose distance to a cone is known without rays,
 //! and so is that of balls.
 
-use bus::component::StepError;
-use bus::context::NodeContext;
-use bus::messages::BodyStates;
+use component::StepError;
+use component::context::NodeContext;
+use component::messages::BodyStates;
 use diagnostics::parameter::{ParameterError, refuse};
 use inputs::InputFiles;
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};

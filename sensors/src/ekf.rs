@@ -9,12 +9,12 @@ mod start;
 mod transition;
 
 use crate::wire::{attitude, vector, vector_message};
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, SampleTimes, StepContext};
-use bus::messages::{
+use component::context::{NodeContext, SampleTimes, StepContext};
+use component::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
-use bus::{InputPorts, OutputPorts};
+use component::{Component, Info, StepError};
+use component::{InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, refuse};
 use filter::{Ekf, EkfState};
 use history::{Measurement, Reading, Source};
@@ -171,7 +171,7 @@ fn innovations(state: &EkfState) -> Innovation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Registration;
+    use component::Registration;
     use serde_json::json;
 
     fn refused(parameters: &serde_json::Value, inputs: &[&str]) -> Option<String> {

@@ -1,7 +1,7 @@
 //! Frames of the standard messages that sensors send.
 
-use bus::context::NodeContext;
-use bus::messages::{FRAME_BYTES_MAX, FrameName, body_frame};
+use component::context::NodeContext;
+use component::messages::{FRAME_BYTES_MAX, FrameName, body_frame};
 use diagnostics::ParameterError;
 
 /// Name of the frame of the body that carries the sensor `node`: that of its vehicle.

@@ -9,9 +9,9 @@ use crate::channel::Chance;
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{vector, vector_message};
-use bus::component::Info;
-use bus::messages::Gps;
-use bus::random::Stream;
+use component::Info;
+use component::messages::Gps;
+use component::random::Stream;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive};
 use inputs::InputFiles;
 use nalgebra::Vector3;
@@ -26,12 +26,12 @@ timed_parameters! {
     /// are tuned, no source.
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::gps::GpsParams;
     /// use sensors::sensing::{Sensing, TruthInputs};
     ///
     /// let parameters = GpsParams { delay_ms: 0.0, ..GpsParams::default() };
-    /// let mut gps = bus::Harness::<Sensing<GpsParams>>::new(parameters).unwrap();
+    /// let mut gps = component::Harness::<Sensing<GpsParams>>::new(parameters).unwrap();
     /// let state = PlantState { velocity: [3.0, 0.0, 0.0].into(), ..Default::default() };
     /// let fix = gps.step(TruthInputs { state: &state }).unwrap().gps;
     /// assert!(fix.valid == 1 && (fix.velocity.x - 3.0).abs() < 0.5, "{fix:?}");
@@ -71,7 +71,7 @@ sensor! {
     pub struct GpsState as "hummingbus_msgs/msg/GpsState" sends gps: Gps {
         /// The drift at the last measurement; not a number before the first.
         #[field(unit = "m", frame = "world")]
-        drift: bus::messages::Vector3,
+        drift: component::messages::Vector3,
     }
 }
 
@@ -119,9 +119,9 @@ mod tests {
     use super::*;
     use crate::sensing::Sensing;
     use crate::testing::{TICK_NS, refusal, require_normal};
-    use bus::Harness;
-    use bus::context::NodeContext;
-    use bus::messages::PlantState;
+    use component::Harness;
+    use component::context::NodeContext;
+    use component::messages::PlantState;
 
     fn truth() -> PlantState {
         PlantState {

@@ -6,14 +6,14 @@
 //! had a part in holds for no vehicle.
 
 use crate::sensing::TruthInputs;
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::StateEstimate;
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::StateEstimate;
+use component::{Component, Info, StepError};
 use diagnostics::ParameterError;
 
 /// Parameters of the estimator: none.
-#[derive(Debug, Clone, Copy, bus::Parameters)]
+#[derive(Debug, Clone, Copy, component::Parameters)]
 pub struct Parameters {}
 
 /// Outputs of the component.
@@ -26,11 +26,11 @@ pub struct Outputs {
 /// The component `ideal`.
 ///
 /// ```
-/// use bus::messages::PlantState;
+/// use component::messages::PlantState;
 /// use sensors::ideal::Ideal;
 /// use sensors::sensing::TruthInputs;
 ///
-/// let mut ideal = bus::Harness::<Ideal>::from_json(&serde_json::json!({})).unwrap();
+/// let mut ideal = component::Harness::<Ideal>::from_json(&serde_json::json!({})).unwrap();
 /// let state = PlantState { velocity: [0.1, 0.0, -0.2].into(), ..Default::default() };
 /// let estimate = ideal.step(TruthInputs { state: &state }).unwrap().estimate;
 /// assert_eq!((estimate.velocity, estimate.velocity_sigma.z), (state.velocity, 0.0));

@@ -10,11 +10,11 @@ use crate::imu_part::{ImuMotion, ImuPart, ImuPartState};
 use crate::noise::{drawn, drawn_words};
 use crate::sensing::TruthInputs;
 use crate::wire::{vector, vector_message};
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{FrameName, Imu, PlantState, ROTORS_MAX, StandardImu, Vector3};
-use bus::random::Stream;
-use bus::{Message, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{FrameName, Imu, PlantState, ROTORS_MAX, StandardImu, Vector3};
+use component::random::Stream;
+use component::{Component, Info, StepError};
+use component::{Message, OutputPorts};
 use diagnostics::ParameterError;
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 
@@ -115,12 +115,12 @@ pub struct Outputs {
 /// An inertial measurement unit.
 ///
 /// ```
-/// use bus::messages::PlantState;
+/// use component::messages::PlantState;
 /// use sensors::imu::ImuSensor;
 /// use sensors::imu_model::ImuParams;
 /// use sensors::sensing::TruthInputs;
 ///
-/// let mut imu = bus::Harness::<ImuSensor>::new(ImuParams::default()).unwrap();
+/// let mut imu = component::Harness::<ImuSensor>::new(ImuParams::default()).unwrap();
 /// let at_rest = PlantState { specific_force: [0.0, 0.0, 9.81].into(), ..Default::default() };
 /// let reading = imu.step(TruthInputs { state: &at_rest }).unwrap().imu;
 /// assert!((reading.specific_force.z - 9.81).abs() < 1.0, "m/s^2 in body axes: {reading:?}");
@@ -215,7 +215,7 @@ fn message(reading: &ImuReading) -> Imu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
+    use component::Harness;
 
     fn truth_at(tick: u32) -> PlantState {
         PlantState {

@@ -7,9 +7,9 @@
 use crate::channel::Timing;
 use crate::noise::{BiasWalk, WhiteNoise};
 use crate::wire::vector;
-use bus::Parameters as _;
-use bus::messages::Imu;
-use bus::random::{Stream, stream};
+use component::Parameters as _;
+use component::messages::Imu;
+use component::random::{Stream, stream};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use nalgebra::Vector3;
 
@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 /// The thesis does not name the part on the Hummingbird, so none of these is its own. The initial biases are
 /// zero: an autopilot nulls them at rest before take-off. Readings are neither delayed nor lost: the
 /// autopilot reads the part over a wire of a few centimetres.
-#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[derive(Debug, Clone, Copy, PartialEq, component::Parameters)]
 #[parameters(default)]
 pub struct ImuParams {
     /// White noise of the accelerometer.

@@ -6,7 +6,7 @@
 
 use crate::imu_model::{ImuParams, ImuReading};
 use crate::steps::in_steps;
-use bus::messages::{PerRotor, ROTORS_MAX};
+use component::messages::{PerRotor, ROTORS_MAX};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 

@@ -6,10 +6,10 @@
 //! is free, is sent without a break, and arrives behind those that were sent before it. The fate of the n-th message
 //! that is sent depends on the seed, the node's name and n alone.
 
-use bus::Message;
-use bus::component::StateError;
-use bus::ports::FORWARDED_BYTES_MAX;
-use bus::random::{self, Stream, uniform};
+use component::Message;
+use component::StateError;
+use component::ports::FORWARDED_BYTES_MAX;
+use component::random::{self, Stream, uniform};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;
@@ -321,7 +321,7 @@ impl LineState {
 #[cfg(test)]
 mod tests {
     use super::{Line, LineState, NoPlace, PLACES_MIN};
-    use bus::random::stream;
+    use component::random::stream;
 
     const MS: u64 = 1_000_000;
 

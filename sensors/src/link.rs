@@ -11,16 +11,16 @@
 //! in which it is sent.
 
 use crate::line::{Line, LineState, NoPlace, PLACES_MIN, STREAMS};
-use bus::announcement::Announcement;
-use bus::component::{Component, Info, State, StateError, StepError, Transfer};
-use bus::context::{NodeContext, SampleTimes, StepContext};
-use bus::messages::Time;
-use bus::ports::{
+use component::announcement::Announcement;
+use component::context::{NodeContext, SampleTimes, StepContext};
+use component::messages::Time;
+use component::ports::{
     FORWARDED_BYTES_MAX, ForwardedInputs, InputSamples, OutputPort, OutputPorts, OutputSamples, PortSpec,
 };
-use bus::random::stream;
-use bus::schema::Extent;
-use bus::{BusError, Message};
+use component::random::stream;
+use component::schema::Extent;
+use component::{BusError, Message};
+use component::{Component, Info, State, StateError, StepError, Transfer};
 use diagnostics::parameter::{positive_up_to, refuse, require, within};
 use diagnostics::{ParameterError, digits};
 use std::collections::BTreeMap;
@@ -57,7 +57,7 @@ const NEVER: Time = Time { sec: -1, nanosec: 0 };
 /// assert_eq!(parameters.baud, 57_600.0);
 /// # Ok::<(), diagnostics::ParameterError>(())
 /// ```
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Bits a second on the wire (thesis §2.2).
     #[parameter(default = BAUD, unit = "bit/s", check = whole_baud)]
@@ -86,7 +86,7 @@ pub struct Parameters {
 }
 
 /// Parameters of a stream.
-#[derive(Clone, Debug, Default, bus::Parameters)]
+#[derive(Clone, Debug, Default, component::Parameters)]
 pub struct StreamParameters {
     /// Bytes of a message on the wire, without the overhead.
     #[parameter(shown = "as many as a recording holds")]
@@ -162,7 +162,7 @@ struct Marks {
 /// Outputs of a link: its statistics, and the newest message of each stream.
 ///
 /// ```
-/// use bus::ports::OutputPorts;
+/// use component::ports::OutputPorts;
 /// // The other outputs are called like its inputs.
 /// assert_eq!(sensors::link::Outputs::DECLARED[0].name, "statistics");
 /// ```
@@ -251,8 +251,8 @@ impl State for LinkMemory {
 /// A data link.
 ///
 /// ```
-/// use bus::component::Component;
-/// use bus::context::{InputMessage, NodeContext};
+/// use component::Component;
+/// use component::context::{InputMessage, NodeContext};
 /// use sensors::link::Link;
 /// # use serde_json::json;
 /// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 1.0, initial: None }];

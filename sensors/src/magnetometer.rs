@@ -9,8 +9,8 @@ use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
 use crate::wire::{attitude, vector_message};
-use bus::component::Info;
-use bus::messages::Magnetometer;
+use component::Info;
+use component::messages::Magnetometer;
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use inputs::InputFiles;
 use nalgebra::Vector3;
@@ -22,12 +22,12 @@ timed_parameters! {
     /// 160 Hz in single measurements of 6 ms each. The default field is that of Krailling near Munich.
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::magnetometer::MagnetometerParams;
     /// use sensors::sensing::{Sensing, TruthInputs};
     ///
     /// let parameters = MagnetometerParams { delay_ms: 0.0, noise_T: 0.0, ..MagnetometerParams::default() };
-    /// let mut magnetometer = bus::Harness::<Sensing<MagnetometerParams>>::new(parameters).unwrap();
+    /// let mut magnetometer = component::Harness::<Sensing<MagnetometerParams>>::new(parameters).unwrap();
     /// let level = PlantState::default();
     /// let field = magnetometer.step(TruthInputs { state: &level }).unwrap().magnetometer.field;
     /// assert!(field.x > 0.0 && field.z < 0.0, "in Europe it points north and down: {field:?}");
@@ -99,8 +99,8 @@ mod tests {
     use super::*;
     use crate::testing::{harness, refusal, require_normal};
     use crate::wire::{attitude_message, vector};
-    use bus::Harness;
-    use bus::messages::PlantState;
+    use component::Harness;
+    use component::messages::PlantState;
     use nalgebra::UnitQuaternion;
 
     fn perfect() -> MagnetometerParams {

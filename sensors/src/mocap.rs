@@ -7,8 +7,8 @@ use crate::channel::Chance;
 use crate::noise::standard_normal;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::component::Info;
-use bus::messages::Mocap;
+use component::Info;
+use component::messages::Mocap;
 use diagnostics::parameter::{ParameterError, finite, not_negative};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -23,12 +23,12 @@ timed_parameters! {
     /// off: they depend on the room.
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::mocap::MocapParams;
     /// use sensors::sensing::{Sensing, TruthInputs};
     ///
     /// let parameters = MocapParams { delay_ms: 0.0, ..MocapParams::default() };
-    /// let mut cameras = bus::Harness::<Sensing<MocapParams>>::new(parameters).unwrap();
+    /// let mut cameras = component::Harness::<Sensing<MocapParams>>::new(parameters).unwrap();
     /// let state = PlantState { position: [1.0, 2.0, 3.0].into(), ..Default::default() };
     /// let seen = cameras.step(TruthInputs { state: &state }).unwrap().mocap;
     /// assert!((seen.position.y - 2.0).abs() < 0.01, "{seen:?}");
@@ -90,8 +90,8 @@ mod tests {
     use super::*;
     use crate::sensing::Sensing;
     use crate::testing::{TICK_NS, harness, refusal, require_normal};
-    use bus::Harness;
-    use bus::messages::PlantState;
+    use component::Harness;
+    use component::messages::PlantState;
 
     fn truth() -> PlantState {
         PlantState {

@@ -4,7 +4,7 @@
 //! truth + bias + white noise, and the bias is the integral of a second white noise. A density holds
 //! at any rate; the size of one sample follows from the density and the time between samples.
 
-use bus::random::{self, Stream, normal};
+use component::random::{self, Stream, normal};
 use nalgebra::Vector3;
 
 /// White noise on each of three axes, independent between axes and between samples.
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// ```
 /// use sensors::noise::WhiteNoise;
 ///
-/// let mut random = bus::random::stream(1, "imu");
+/// let mut random = component::random::stream(1, "imu");
 /// let (quiet, noisy) = (WhiteNoise::new(0.0, 1000.0), WhiteNoise::new(2e-3, 1000.0));
 /// assert!(quiet.sample(&mut random).norm() == 0.0 && noisy.sample(&mut random).norm() > 0.0);
 /// ```
@@ -118,7 +118,7 @@ impl<'a> LazyStream<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::random::stream;
+    use component::random::stream;
 
     const SAMPLES: usize = 40_000;
 

@@ -1,7 +1,7 @@
 //! Parameters that sensors share: the times of measurements, their delays and losses.
 
 use crate::channel::Timing;
-use bus::Parameters;
+use component::Parameters;
 
 /// Declares parameters with the four of [`Timing`] first: `struct Name timed { rate_hz: …, delay_ms: … } { fields }`. The fields are those
 /// of a struct that derives [`Parameters`].
@@ -11,7 +11,7 @@ macro_rules! timed_parameters {
         pub struct $name:ident timed { rate_hz: $rate_hz:expr, delay_ms: $delay_ms:expr } { $($fields:tt)* }
     ) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, PartialEq, bus::Parameters)]
+        #[derive(Debug, Clone, PartialEq, component::Parameters)]
         #[parameters(default)]
         pub struct $name {
             /// Measurements a second.

@@ -14,11 +14,11 @@ use crate::frame::{body_frame_of, frame};
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
 use crate::wire::{attitude, body_poses, vector};
-use bus::component::{Info, StepError};
-use bus::context::NodeContext;
-use bus::messages::{BodyStates, FrameName, LaserScan, PlantState, Ranges, StandardRange, Traffic};
-use bus::random::normal;
-use bus::{InputPorts, OutputPorts};
+use component::context::NodeContext;
+use component::messages::{BodyStates, FrameName, LaserScan, PlantState, Ranges, StandardRange, Traffic};
+use component::random::normal;
+use component::{Info, StepError};
+use component::{InputPorts, OutputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use inputs::InputFiles;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -51,13 +51,13 @@ timed_parameters! {
     /// Table 2.1) and the radius of its 8 inch propellers (thesis, §2.1).
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::range::{RangeFinders, RangeInputs, RangeParams};
     /// use sensors::sensing::Sensing;
     ///
     /// let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
     /// let parameters = RangeParams { scene: Some(scene.into()), delay_ms: 0.0, ..RangeParams::default() };
-    /// let mut range = bus::Harness::<Sensing<RangeFinders>>::new(parameters).unwrap();
+    /// let mut range = component::Harness::<Sensing<RangeFinders>>::new(parameters).unwrap();
     /// let state = PlantState { position: [0.0, 0.0, 1.5].into(), ..Default::default() };
     /// let ranges = range.step(RangeInputs { state: &state, traffic: None, bodies: None }).unwrap().ranges;
     /// assert!((ranges.distance[4] - 1.5).abs() < 0.1, "the last beam looks down: {ranges:?}");
@@ -185,7 +185,7 @@ impl RangeFinders {
 }
 
 /// State of the sensor.
-#[derive(Debug, Clone, Copy, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/RangeState", role = "state")]
 pub struct RangeState {
@@ -308,7 +308,7 @@ mod tests {
     use crate::sensing::Sensing;
     use crate::testing::{TICK_NS, harness, refusal, require_normal};
     use crate::wire::attitude_message;
-    use bus::Harness;
+    use component::Harness;
 
     const ROOM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/room.toml");
 
@@ -350,14 +350,14 @@ mod tests {
         let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/slung-load.toml");
         let params = RangeParams { scene: Some(scene.into()), ..perfect() };
         let checked = |ports: &[&str]| {
-            let context = bus::context::NodeContext::new("range", ports);
+            let context = component::context::NodeContext::new("range", ports);
             Harness::<Sensing<RangeFinders>>::in_context(params.clone(), &context).map(|_| ())
         };
         let error = checked(&["state"]).unwrap_err().to_string();
         assert!(error.contains("`bodies`"), "{error}");
         let mut finders = Harness::<Sensing<RangeFinders>>::in_context(
             params.clone(),
-            &bus::context::NodeContext::new("range", &["state", "bodies"]),
+            &component::context::NodeContext::new("range", &["state", "bodies"]),
         )
         .unwrap();
         // The load, 3 cm in radius, hangs 0.8 m below, and is 2 m ahead later.

@@ -5,10 +5,10 @@ pub mod filter;
 mod gains;
 pub mod params;
 
-use bus::OutputPorts;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{StateEstimate, WallEstimate};
+use component::OutputPorts;
+use component::context::{NodeContext, StepContext};
+use component::messages::{StateEstimate, WallEstimate};
+use component::{Component, Info, StepError};
 use diagnostics::ParameterError;
 use filter::{RangeInertial, RangeInertialInputs, RangeInertialState};
 use params::RangeInertialParams;
@@ -56,8 +56,8 @@ impl Component for RangeInertial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bus::Harness;
-    use bus::messages::{AttitudeEstimate, Gps, Imu, Ranges};
+    use component::Harness;
+    use component::messages::{AttitudeEstimate, Gps, Imu, Ranges};
     use serde_json::json;
 
     #[test]

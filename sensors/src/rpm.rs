@@ -7,9 +7,9 @@
 use crate::channel::Chance;
 use crate::sensing::{Sensor, TruthInputs};
 use crate::steps::in_steps;
-use bus::component::{Info, StepError};
-use bus::messages::{ROTORS_MAX, RotorSpeeds};
-use bus::random::normal;
+use component::messages::{ROTORS_MAX, RotorSpeeds};
+use component::random::normal;
+use component::{Info, StepError};
 use diagnostics::parameter::{ParameterError, not_negative, require};
 use inputs::InputFiles;
 
@@ -21,12 +21,12 @@ timed_parameters! {
     /// tuned, no source: one count, 200 Hz. *Delay* is off: the count is timed where it is made.
     ///
     /// ```
-    /// use bus::messages::PlantState;
+    /// use component::messages::PlantState;
     /// use sensors::rpm::RpmParams;
     /// use sensors::sensing::{Sensing, TruthInputs};
     ///
     /// let parameters = RpmParams { half_reading_rotor: 2, ..RpmParams::default() };
-    /// let mut rpm = bus::Harness::<Sensing<RpmParams>>::new(parameters).unwrap();
+    /// let mut rpm = component::Harness::<Sensing<RpmParams>>::new(parameters).unwrap();
     /// let state = PlantState { rotor_speed: [400.0; 4].into(), ..Default::default() };
     /// let speeds = rpm.step(TruthInputs { state: &state }).unwrap().speeds.rotor_speed;
     /// let (first, second) = (speeds[0], speeds[1]);
@@ -117,8 +117,8 @@ impl Sensor for RpmParams {
 mod tests {
     use super::*;
     use crate::testing::{harness, refusal, require_normal};
-    use bus::Harness;
-    use bus::messages::{PerRotor, PlantState};
+    use component::Harness;
+    use component::messages::{PerRotor, PlantState};
 
     fn truth_at(time_s: f64) -> PlantState {
         let rotor_speed = [400.0, 410.0 + 50.0 * time_s, 420.0, 430.0].into();

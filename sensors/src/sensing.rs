@@ -2,12 +2,12 @@
 
 use crate::channel::{Chance, Channel, Queued, Remembered};
 use crate::parameters::Timed;
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
-use bus::ports::{InputPorts, OutputPorts};
-use bus::sample_ticks::SampleTicks;
-use bus::{InputPorts, Message};
+use component::context::{NodeContext, StepContext};
+use component::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
+use component::ports::{InputPorts, OutputPorts};
+use component::sample_ticks::SampleTicks;
+use component::{Component, Info, StepError};
+use component::{InputPorts, Message};
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 
@@ -19,7 +19,7 @@ macro_rules! sensor {
         }
     ) => {
         /// State of the sensor.
-        #[derive(Debug, Clone, Copy, Default, bus::Message)]
+        #[derive(Debug, Clone, Copy, Default, component::Message)]
         #[repr(C)]
         #[message(type_name = $type_name, role = "state")]
         pub struct $State {
@@ -37,7 +37,7 @@ macro_rules! sensor {
         }
 
         /// Outputs of the sensor.
-        #[derive(Debug, bus::OutputPorts)]
+        #[derive(Debug, component::OutputPorts)]
         pub struct Outputs {
             /// The measurement that arrived last.
             pub $port: $Message,
@@ -156,11 +156,11 @@ pub struct TruthInputs<'a> {
 /// The component that a sensor is.
 ///
 /// ```
-/// use bus::messages::PlantState;
+/// use component::messages::PlantState;
 /// use sensors::gps::GpsParams;
 /// use sensors::sensing::{Sensing, TruthInputs};
 ///
-/// let mut gps = bus::Harness::<Sensing<GpsParams>>::new(GpsParams::default()).unwrap();
+/// let mut gps = component::Harness::<Sensing<GpsParams>>::new(GpsParams::default()).unwrap();
 /// let state = PlantState { position: [10.0, -20.0, 5.0].into(), ..Default::default() };
 /// let sent: Vec<_> = (0..=80).map(|_| gps.step(TruthInputs { state: &state }).unwrap().gps).collect();
 /// assert_eq!((sent[79].valid, sent[80].valid), (0, 1), "its first measurement arrives after 80 ms");

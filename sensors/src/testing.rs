@@ -1,8 +1,8 @@
 //! Helpers that the tests of sensors share.
 
 use crate::sensing::{Sensing, Sensor};
-use bus::Harness;
-use bus::context::NodeContext;
+use component::Harness;
+use component::context::NodeContext;
 
 /// A tick of 1 ms.
 pub(crate) const TICK_NS: u64 = 1_000_000;

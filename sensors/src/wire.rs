@@ -1,6 +1,6 @@
 //! The vectors and quaternions of messages as those of nalgebra, and back.
 
-use bus::messages::{BodyStates, Quaternion, Vector3};
+use component::messages::{BodyStates, Quaternion, Vector3};
 use scenes::{BODIES_MAX, BodyPose};
 
 /// A message's vector.

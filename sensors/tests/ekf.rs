@@ -10,7 +10,7 @@
 
 mod support;
 
-use bus::random::{Stream, normal, stream};
+use component::random::{Stream, normal, stream};
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use sensors::ekf::filter::{Ekf, EkfState, deviation};
 use sensors::ekf::history::{Measurement, Newest, Reading, Source};
@@ -185,7 +185,7 @@ fn reading(read: &ImuReading, time_ns: u64) -> Reading {
 
 fn errors(sample: &Sample<'_>) -> SVector<f64, JUDGED> {
     let motion = sample.state.motion();
-    let vector = |v: bus::messages::Vector3| Vector3::from(<[f64; 3]>::from(v));
+    let vector = |v: component::messages::Vector3| Vector3::from(<[f64; 3]>::from(v));
     let q = motion.attitude;
     let attitude = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z));
     let turn_W = (sample.truth.attitude_WB * attitude.inverse()).scaled_axis();

@@ -6,8 +6,8 @@
 
 mod support;
 
-use bus::messages::{Gps, Imu, Ranges, WallEstimate};
-use bus::random::{Stream, normal, stream};
+use component::messages::{Gps, Imu, Ranges, WallEstimate};
+use component::random::{Stream, normal, stream};
 use nalgebra::Vector3;
 use sensors::complementary::{Complementary, ComplementaryParams, ComplementaryState};
 use sensors::imu_model::{ImuModel, ImuParams};

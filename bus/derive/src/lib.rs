@@ -3,9 +3,13 @@
 //!
 //! The derive refuses a struct that is not `repr(C)`, has implicit padding, or has a field name that ROS 2
 //! tools reject. A floating-point field without its unit is refused too.
+//!
+//! The generated code names the crate `component` over the package that the `Cargo.toml` of the deriving crate depends on:
+//! `hummingbus-component`, `hummingbus-bus` or `hummingbus`.
 
 mod fields;
 mod parameters;
+mod root;
 
 use fields::{doc_text, named_fields, require_no_generics};
 use proc_macro::TokenStream;
@@ -13,7 +17,7 @@ use proc_macro2::TokenStream as Tokens;
 use quote::quote;
 use syn::{Attribute, DeriveInput, Error, Field, LitStr, Result, Type, parse_macro_input};
 
-/// Derives `bus::Message` for a `repr(C)` struct without padding.
+/// Derives `component::Message` for a `repr(C)` struct without padding.
 ///
 /// On the struct: `#[message(type_name = "package/msg/Name")]`, and `definition = "…"` where the ROS 2
 /// definition is nested differently from the Rust struct; `role = "state"` for the state of a component that no topic
@@ -25,7 +29,15 @@ pub fn derive_message(input: TokenStream) -> TokenStream {
 }
 
 fn expanded(input: &DeriveInput, expand: fn(&DeriveInput) -> Result<Tokens>) -> TokenStream {
-    expand(input).unwrap_or_else(Error::into_compile_error).into()
+    let (root, expanded) = (root::path(), expand(input).unwrap_or_else(Error::into_compile_error));
+    quote! {
+        const _: () = {
+            use #root as __component;
+
+            #expanded
+        };
+    }
+    .into()
 }
 
 fn expand(input: &DeriveInput) -> Result<Tokens> {
@@ -49,7 +61,7 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
             );
             assert!(::core::mem::align_of::<#name>() <= 8, "a message's alignment is at most 8 bytes");
             assert!(
-                #is_state || ::bus::schema::sequences_are_last(<#name as ::bus::Message>::SCHEMA.fields),
+                #is_state || __component::schema::sequences_are_last(<#name as __component::Message>::SCHEMA.fields),
                 concat!(
                     "message ", stringify!(#name), " has a `Bounded` that is not its last field, stands in a nested ",
                     "message, or states no unit: move it to the end, or add #[field(unit = \"m/s\")]",
@@ -58,14 +70,14 @@ fn expand(input: &DeriveInput) -> Result<Tokens> {
         };
         // SAFETY: every field is `Pod` (required by `FieldType`), the struct is `repr(C)` and has no
         // padding (asserted above), so every bit pattern is a value and every value is plain bytes.
-        unsafe impl ::bus::__private::bytemuck::Zeroable for #name {}
+        unsafe impl __component::__private::bytemuck::Zeroable for #name {}
         // SAFETY: as above.
-        unsafe impl ::bus::__private::bytemuck::Pod for #name {}
-        impl ::bus::schema::FieldType for #name {
-            const KIND: ::bus::schema::Kind = ::bus::schema::Kind::Message(<#name as ::bus::Message>::SCHEMA);
+        unsafe impl __component::__private::bytemuck::Pod for #name {}
+        impl __component::schema::FieldType for #name {
+            const KIND: __component::schema::Kind = __component::schema::Kind::Message(<#name as __component::Message>::SCHEMA);
         }
-        impl ::bus::Message for #name {
-            const SCHEMA: &'static ::bus::schema::Schema = &::bus::schema::Schema {
+        impl __component::Message for #name {
+            const SCHEMA: &'static __component::schema::Schema = &__component::schema::Schema {
                 type_name: #type_name,
                 doc: #doc,
                 size: ::core::mem::size_of::<#name>(),
@@ -98,19 +110,19 @@ fn message_options(input: &DeriveInput) -> Result<MessageOptions> {
     }
 }
 
-/// Derives `bus::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.
+/// Derives `component::ports::InputPorts` for a struct `Name<'a>` whose fields are `&'a T` and `Option<&'a T>`.
 #[proc_macro_derive(InputPorts)]
 pub fn derive_input_ports(input: TokenStream) -> TokenStream {
     expanded(&parse_macro_input!(input), expand_inputs)
 }
 
-/// Derives `bus::ports::OutputPorts` for a struct whose fields are `T` and `Option<T>`.
+/// Derives `component::ports::OutputPorts` for a struct whose fields are `T` and `Option<T>`.
 #[proc_macro_derive(OutputPorts)]
 pub fn derive_output_ports(input: TokenStream) -> TokenStream {
     expanded(&parse_macro_input!(input), expand_outputs)
 }
 
-/// Derives `bus::Parameters` and `serde::Deserialize` for a struct: the content of a `parameters` table of a manifest, which refuses
+/// Derives `component::Parameters` and `serde::Deserialize` for a struct: the content of a `parameters` table of a manifest, which refuses
 /// unknown keys. The doc comment of a field is its meaning in the documentation.
 ///
 /// `#[parameter(…)]` on a field takes
@@ -122,7 +134,7 @@ pub fn derive_output_ports(input: TokenStream) -> TokenStream {
 /// - `table = TYPE`: the type that declares and checks the keys of the table; with `entry = "NAME"` those of each table in it, or in the list
 ///   (`"N"`).
 /// - `example = "…"`: a value for examples, as TOML.
-/// - `file = EXPRESSION`: the kind of the file whose path it is, a `bus::FileKind`. The launcher reads it of a component's own parameters, not
+/// - `file = EXPRESSION`: the kind of the file whose path it is, a `inputs::FileKind`. The launcher reads it of a component's own parameters, not
 ///   within tables.
 /// - `initial`: the parameter counts only at the start. A run from a checkpoint refuses other values. As `file`, it has no effect within
 ///   tables.
@@ -141,15 +153,16 @@ fn expand_inputs(input: &DeriveInput) -> Result<Tokens> {
     let lifetime = lifetime.ok_or_else(wrong)?;
     let (name, lifetime) = (&input.ident, &lifetime.lifetime);
     let fields = named_fields(input)?;
-    let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::InputPort<#lifetime>)));
+    let specs =
+        fields.iter().map(|field| port_spec(field, &quote!(__component::ports::InputPort<#lifetime>)));
     let names = fields.iter().map(|field| &field.ident);
     let ports = 0..fields.len();
     Ok(quote! {
-        impl<#lifetime> ::bus::ports::InputPorts<#lifetime> for #name<#lifetime> {
-            const DECLARED: ::bus::ports::Inputs = ::bus::ports::Inputs::Ports(&[#(#specs),*]);
+        impl<#lifetime> __component::ports::InputPorts<#lifetime> for #name<#lifetime> {
+            const DECLARED: __component::ports::Inputs = __component::ports::Inputs::Ports(&[#(#specs),*]);
 
-            fn read(samples: ::bus::ports::InputSamples<#lifetime>) -> Self {
-                Self { #(#names: ::bus::ports::InputPort::read(samples, #ports)),* }
+            fn read(samples: __component::ports::InputSamples<#lifetime>) -> Self {
+                Self { #(#names: __component::ports::InputPort::read(samples, #ports)),* }
             }
         }
     })
@@ -159,24 +172,24 @@ fn expand_outputs(input: &DeriveInput) -> Result<Tokens> {
     require_no_generics(input, "outputs are sent by value: they cannot be generic")?;
     let name = &input.ident;
     let fields = named_fields(input)?;
-    let specs = fields.iter().map(|field| port_spec(field, &quote!(::bus::ports::OutputPort)));
+    let specs = fields.iter().map(|field| port_spec(field, &quote!(__component::ports::OutputPort)));
     let names: Vec<_> = fields.iter().map(|field| &field.ident).collect();
     let ports: Vec<usize> = (0..fields.len()).collect();
     Ok(quote! {
-        impl ::bus::ports::OutputPorts for #name {
-            const DECLARED: &'static [::bus::ports::PortSpec] = &[#(#specs),*];
+        impl __component::ports::OutputPorts for #name {
+            const DECLARED: &'static [__component::ports::PortSpec] = &[#(#specs),*];
 
             fn write(
                 &self,
-                samples: &mut ::bus::ports::OutputSamples<'_>,
-            ) -> ::core::result::Result<(), ::bus::BusError> {
-                #(::bus::ports::OutputPort::write(&self.#names, samples, #ports)?;)*
+                samples: &mut __component::ports::OutputSamples<'_>,
+            ) -> ::core::result::Result<(), __component::BusError> {
+                #(__component::ports::OutputPort::write(&self.#names, samples, #ports)?;)*
                 ::core::result::Result::Ok(())
             }
 
-            fn read(samples: ::bus::ports::InputSamples<'_>) -> ::core::option::Option<Self> {
+            fn read(samples: __component::ports::InputSamples<'_>) -> ::core::option::Option<Self> {
                 ::core::option::Option::Some(Self {
-                    #(#names: ::bus::ports::OutputPort::read(samples, #ports)?),*
+                    #(#names: __component::ports::OutputPort::read(samples, #ports)?),*
                 })
             }
         }
@@ -188,7 +201,7 @@ fn port_spec(field: &Field, port: &Tokens) -> Tokens {
     let Field { ident, ty, attrs, .. } = field;
     let (name, doc) = (ident.as_ref().map(ToString::to_string), doc_text(attrs));
     quote! {
-        ::bus::ports::PortSpec {
+        __component::ports::PortSpec {
             name: #name,
             doc: #doc,
             schema: <#ty as #port>::SCHEMA,
@@ -257,13 +270,13 @@ fn field_schema(input: &DeriveInput, field: &Field) -> Result<Tokens> {
     let [unit, frame] = [unit, frame].map(|text| text.map_or(String::new(), |text| text.value()));
     let (ty, doc) = (&field.ty, doc_text(&field.attrs));
     Ok(quote! {
-        ::bus::schema::Field {
+        __component::schema::Field {
             name: #name,
             doc: #doc,
             unit: #unit,
             frame: #frame,
             offset: ::core::mem::offset_of!(#owner, #ident),
-            kind: <#ty as ::bus::schema::FieldType>::KIND,
+            kind: <#ty as __component::schema::FieldType>::KIND,
         }
     })
 }

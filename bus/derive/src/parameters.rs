@@ -84,7 +84,7 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
     let checks: Vec<_> = fields.iter().filter_map(Declared::validation).collect();
     let checks = (!checks.is_empty()).then(|| {
         quote! {
-            fn out_of_range(&self) -> ::std::vec::Vec<::bus::ParameterError> {
+            fn out_of_range(&self) -> ::std::vec::Vec<__component::ParameterError> {
                 let mut errors = ::std::vec::Vec::new();
                 #(#checks)*
                 errors
@@ -95,8 +95,8 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<Tokens> {
     let default = has_default(input)?.then(|| default(name, &fields)).transpose()?;
     Ok(quote! {
         #[automatically_derived]
-        impl ::bus::Parameters for #name {
-            const DECLARED: &'static [::bus::parameters::Parameter] = &[#(#declarations),*];
+        impl __component::Parameters for #name {
+            const DECLARED: &'static [__component::parameters::Parameter] = &[#(#declarations),*];
 
             #checks
         }
@@ -148,18 +148,18 @@ fn deserialize(name: &Ident, fields: &[Declared<'_>]) -> Tokens {
         const _: () = {
             #(#functions)*
 
-            #[derive(::bus::__private::serde::Deserialize)]
-            #[serde(crate = "::bus::__private::serde", rename = #text, deny_unknown_fields)]
+            #[derive(__component::__private::serde::Deserialize)]
+            #[serde(crate = "__component::__private::serde", rename = #text, deny_unknown_fields)]
             struct Twin {
                 #(#attributes #idents: #types,)*
             }
 
             #[automatically_derived]
-            impl<'de> ::bus::__private::serde::Deserialize<'de> for #name {
-                fn deserialize<D: ::bus::__private::serde::Deserializer<'de>>(
+            impl<'de> __component::__private::serde::Deserialize<'de> for #name {
+                fn deserialize<D: __component::__private::serde::Deserializer<'de>>(
                     deserializer: D,
                 ) -> ::core::result::Result<Self, D::Error> {
-                    let Twin { #(#idents),* } = ::bus::__private::serde::Deserialize::deserialize(deserializer)?;
+                    let Twin { #(#idents),* } = __component::__private::serde::Deserialize::deserialize(deserializer)?;
                     ::core::result::Result::Ok(Self { #(#idents),* })
                 }
             }
@@ -209,26 +209,28 @@ impl<'f> Declared<'f> {
         let Self { field, name, options, .. } = self;
         let (doc, unit) = (doc_text(&field.attrs), self.unit());
         let default = match (&options.shown, &options.default) {
-            (Some(shown), _) => quote!(::bus::parameters::DefaultValue::Text(#shown)),
+            (Some(shown), _) => quote!(__component::parameters::DefaultValue::Text(#shown)),
             (None, Some(value)) => {
                 let ty = &field.ty;
-                quote!(::bus::parameters::DefaultValue::Value(|| {
+                quote!(__component::parameters::DefaultValue::Value(|| {
                     let value: #ty = #value;
                     ::std::format!("{value:?}")
                 }))
             }
-            (None, None) if is_option(&field.ty) => quote!(::bus::parameters::DefaultValue::Text("none")),
-            (None, None) => quote!(::bus::parameters::DefaultValue::Required),
+            (None, None) if is_option(&field.ty) => {
+                quote!(__component::parameters::DefaultValue::Text("none"))
+            }
+            (None, None) => quote!(__component::parameters::DefaultValue::Required),
         };
         let range = match (&options.range, &options.check) {
             (Some(range), _) => quote!(|| ::std::string::String::from(#range)),
-            (None, Some(check)) => quote!(|| ::bus::parameters::range_of(&#check)),
+            (None, Some(check)) => quote!(|| __component::parameters::range_of(&#check)),
             (None, None) => quote!(::std::string::String::new),
         };
         let table = options
             .table
             .as_ref()
-            .map_or_else(|| quote!(&[]), |table| quote!(<#table as ::bus::Parameters>::DECLARED));
+            .map_or_else(|| quote!(&[]), |table| quote!(<#table as __component::Parameters>::DECLARED));
         let [entry, example] = [&options.entry, &options.example]
             .map(|text| text.as_ref().map(LitStr::value).unwrap_or_default());
         let file = match &options.file {
@@ -237,7 +239,7 @@ impl<'f> Declared<'f> {
         };
         let is_initial = options.initial;
         quote! {
-            ::bus::parameters::Parameter {
+            __component::parameters::Parameter {
                 name: #name,
                 doc: #doc,
                 unit: #unit,
@@ -257,11 +259,11 @@ impl<'f> Declared<'f> {
         let Self { ident, name, options, .. } = self;
         if let Some(check) = &options.check {
             return Some(quote! {
-                errors.extend(::bus::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number)).err());
+                errors.extend(__component::parameters::Numbers::all(&self.#ident, &|number| (#check)(#name, number)).err());
             });
         }
         options.table.as_ref()?;
-        let validated = |table: Tokens, key: Tokens| quote!(errors.extend(::bus::Parameters::out_of_range(#table).into_iter().map(|error| error.within(#key))););
+        let validated = |table: Tokens, key: Tokens| quote!(errors.extend(__component::Parameters::out_of_range(#table).into_iter().map(|error| error.within(#key))););
         Some(match options.entry.as_ref().map(LitStr::value).as_deref() {
             None => validated(quote!(&self.#ident), quote!(#name)),
             Some(NUMBER) => {

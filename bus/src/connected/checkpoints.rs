@@ -1,7 +1,7 @@
 //! The parts of checkpoints that a connected node writes, and the one that it goes on from.
 
 use super::ConnectedNode;
-use crate::announcement::{Announcement, topic_path};
+use crate::announcement::{self, topic_path};
 use crate::checkpoint::{Cause, NodePart, Samples, store_part};
 use crate::computation::Computation;
 use crate::error::BusError;
@@ -30,7 +30,7 @@ impl ConnectedNode {
         let restored = Samples::of_run(&links.run_dir, &links.plan)?;
         for output in &links.node.outputs {
             let topic = &links.plan.topics[output.topic];
-            let announced = Announcement::load(&topic_path(&links.run_dir, output.topic))?;
+            let announced = announcement::load(&topic_path(&links.run_dir, output.topic))?;
             let sent = InPort::of_predecessor(output, topic, &announced, restored.get(&topic.name));
             self.stepper.predecessor.push(sent);
         }

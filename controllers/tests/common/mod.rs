@@ -3,9 +3,9 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use bus::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
-use bus::random::{Stream, stream};
-use bus::{InputMemory, InputMessages};
+use component::messages::{AttitudeEstimate, Reference, SetPoint, StateEstimate};
+use component::random::{Stream, stream};
+use component::{InputMemory, InputMessages};
 use controllers::airframe::ControlledVehicle;
 use controllers::allocation::RotorWrench;
 use controllers::bumpless::BumplessTransfer;

@@ -6,8 +6,10 @@
 #![allow(dead_code, reason = "each test uses a part of it")]
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use bus::messages::{AttitudeEstimate, Reference, SetPoint as SetPointMessage, StateEstimate, WallEstimate};
-use bus::{InputMemory, InputMessages};
+use component::messages::{
+    AttitudeEstimate, Reference, SetPoint as SetPointMessage, StateEstimate, WallEstimate,
+};
+use component::{InputMemory, InputMessages};
 use controllers::airframe::ControlledVehicle;
 use controllers::bumpless::BumplessTransfer;
 use controllers::control::{ControlOutput, MotionEstimate};
@@ -65,7 +67,7 @@ pub struct Senses {
     filter_state: ComplementaryState,
     errors: RangeErrors,
     walls: Walls,
-    random: bus::random::Stream,
+    random: component::random::Stream,
     velocity_error_m_s: [f64; 3],
     seen: WallEstimate,
     /// Objects that stand in the beams beside walls.
@@ -82,7 +84,7 @@ impl Senses {
             filter_state: ComplementaryState::default(),
             errors,
             walls,
-            random: bus::random::stream(seed, "range"),
+            random: component::random::stream(seed, "range"),
             velocity_error_m_s: [0.0; 3],
             seen: WallEstimate::default(),
             others_W_m: Vec::new(),
@@ -90,7 +92,7 @@ impl Senses {
     }
 
     fn normal(&mut self) -> f64 {
-        bus::random::normal(&mut self.random)
+        component::random::normal(&mut self.random)
     }
 
     pub fn attitude(&mut self, plant: &NewtonEuler, state: &State) -> AttitudeEstimate {

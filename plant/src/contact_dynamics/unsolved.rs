@@ -68,7 +68,7 @@ impl Outcome {
 /// Impulses that were not found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unsolved {
-    /// The two that the worst of them pushes, as `bus::messages::Contact` numbers them, the vehicle as 0; none of a stop.
+    /// The two that the worst of them pushes, as `component::messages::Contact` numbers them, the vehicle as 0; none of a stop.
     objects: Option<[u32; 2]>,
     outcome: Outcome,
 }

@@ -21,7 +21,7 @@ use rapier3d_f64::parry::query::{
 use scenes::{Scene, Surface, Thing};
 use std::f64::consts::FRAC_PI_2;
 
-/// Number of the ground, as `bus::messages::Contact` counts objects; the vehicle's own colliders are 0.
+/// Number of the ground, as `component::messages::Contact` counts objects; the vehicle's own colliders are 0.
 pub(super) const GROUND: u32 = 1;
 /// The vehicle's feet, as [`Near::part`] numbers its colliders.
 pub(super) const FEET: u32 = 0b1111;
@@ -93,7 +93,7 @@ struct Moving {
 /// A point where the vehicle or a free body may touch something.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
-    /// Number of the object, as `bus::messages::Contact` counts them.
+    /// Number of the object, as `component::messages::Contact` counts them.
     pub object: u32,
     /// The numbers of the two bodies: the object, and the body that is near it.
     pub bodies: [usize; 2],
@@ -245,7 +245,7 @@ impl World {
         }
     }
 
-    /// The first two that overlap, as `bus::messages::Contact` numbers them: a free body with another, with a
+    /// The first two that overlap, as `component::messages::Contact` numbers them: a free body with another, with a
     /// still thing, or with the vehicle, 0.
     pub(super) fn overlap(&mut self, vehicle: &RigidBody, states: &[RigidBody]) -> Option<[u32; 2]> {
         let mut found = Vec::new();

@@ -270,7 +270,7 @@ impl Run<'_> {
         };
         let (before, files) = ((before, &self.plan.nodes[backup.node]), declared.files.listing_anew());
         // A component that cannot be made is refused elsewhere, with its place.
-        if component.goes_on_from(&backup.plan, before, self.plan, &files).unwrap_or(true) {
+        if bus::goes_on_from((component, &backup.plan), before, self.plan, &files).unwrap_or(true) {
             return Ok(());
         }
         let message = format!("the backup of `{}` does not go on from its state", backup.plan.name);

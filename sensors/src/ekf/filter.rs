@@ -22,9 +22,9 @@ use super::params::EkfParams;
 use super::start::{lost_covariance, start};
 use super::transition::{Covariance, CovarianceView, STATES, Transition};
 use crate::wire::attitude;
-use bus::Message;
-use bus::Parameters as _;
-use bus::component::{State, StateError, Transfer};
+use component::Message;
+use component::Parameters as _;
+use component::{State, StateError, Transfer};
 use diagnostics::parameter::{ParameterError, positive, require};
 use nalgebra::{SMatrix, Vector3};
 
@@ -93,9 +93,9 @@ pub struct Kept {
 /// The filter at one sample period, with everything that does not change during a run.
 ///
 /// ```
-/// use bus::Harness;
-/// use bus::context::NodeContext;
-/// use bus::messages::{Imu, Mocap};
+/// use component::Harness;
+/// use component::context::NodeContext;
+/// use component::messages::{Imu, Mocap};
 /// use sensors::ekf::{EkfInputs, filter::Ekf, params::EkfParams};
 ///
 /// let context = NodeContext::new("ekf", &["imu", "mocap"]);

@@ -1,7 +1,7 @@
 //! Recent past, as the filter remembers it: the IMU's readings, and measurements that wait their turn.
 
-use bus::Message;
-use bus::messages::Vector3;
+use component::Message;
+use component::messages::Vector3;
 
 /// Readings that are remembered at least.
 const READINGS_MIN: usize = 256;
@@ -168,7 +168,7 @@ impl Readings {
     }
 }
 
-/// A sensor of quantities that the filter estimates, in the order of `bus::messages::Innovation`.
+/// A sensor of quantities that the filter estimates, in the order of `component::messages::Innovation`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A satellite receiver.

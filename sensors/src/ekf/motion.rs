@@ -5,8 +5,8 @@ use super::transition::{
     ACCELEROMETER, ATTITUDE, BAROMETER, Errors, GPS, GYROSCOPE, POSITION, Transition, VELOCITY,
 };
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use bus::Message;
-use bus::messages::{Quaternion, Vector3 as Vector3Message};
+use component::Message;
+use component::messages::{Quaternion, Vector3 as Vector3Message};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The motion, and what the sensors' errors are taken for.

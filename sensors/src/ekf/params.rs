@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 /// built-in kinds, whose rooms name their sources, with the rounding to the part's resolution included: a variance of
 /// resolution² / 12. The barometer's are its pascals in metres at sea level, where the air weighs 12.01 N/m³.
 /// The uncertainties of the start are tuned, no source.
-#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[derive(Debug, Clone, Copy, PartialEq, component::Parameters)]
 #[parameters(default)]
 pub struct EkfParams {
     /// White noise of the accelerometer.

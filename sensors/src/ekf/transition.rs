@@ -12,8 +12,8 @@
 
 use super::params::EkfParams;
 use crate::wire::{vector, vector_message};
-use bus::Message;
-use bus::messages::Vector3 as Vector3Message;
+use component::Message;
+use component::messages::Vector3 as Vector3Message;
 use nalgebra::{Matrix3, SMatrix, SMatrixView, SVector, Vector3};
 
 /// Number of errors.

@@ -1,7 +1,7 @@
 //! One axis of the range-inertial estimator: a Kalman filter over velocity, bias, path and two distances.
 
 use super::params::RangeInertialParams;
-use bus::Message;
+use component::Message;
 use nalgebra::{SMatrix, SVector};
 
 const STATES: usize = 5;

@@ -23,11 +23,11 @@ use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::gains::{Gains, TooLongAgo};
 use super::params::RangeInertialParams;
 use crate::wire::{attitude, vector, vector_message};
-use bus::Parameters as _;
-use bus::messages::{
+use component::Parameters as _;
+use component::messages::{
     AttitudeEstimate, Gps, Imu, Quaternion, Ranges, StateEstimate, Vector3 as Vector3Message, WallEstimate,
 };
-use bus::{InputPorts, Message};
+use component::{InputPorts, Message};
 use diagnostics::parameter::{ParameterError, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -129,8 +129,8 @@ pub struct RangeInertialInputs<'a> {
 /// The estimator at one sample period, with everything that does not change during a run.
 ///
 /// ```
-/// use bus::Harness;
-/// use bus::messages::{AttitudeEstimate, Imu, Ranges};
+/// use component::Harness;
+/// use component::messages::{AttitudeEstimate, Imu, Ranges};
 /// use sensors::range_inertial::filter::{RangeInertial, RangeInertialInputs};
 /// use sensors::range_inertial::params::RangeInertialParams;
 ///

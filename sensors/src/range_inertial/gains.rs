@@ -6,8 +6,8 @@
 //! and Navigation, section 7.7, treats measurements that are out of sequence.
 
 use crate::wire::{vector, vector_message};
-use bus::Message;
-use bus::messages::Vector3 as Vector3Message;
+use component::Message;
+use component::messages::Vector3 as Vector3Message;
 use nalgebra::Vector3;
 
 /// Number of sums that are kept.

@@ -3,7 +3,7 @@
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 
 /// Uncertainties of the range finders, the IMU and the attitude, and the start of the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, bus::Parameters)]
+#[derive(Debug, Clone, Copy, PartialEq, component::Parameters)]
 #[parameters(default)]
 pub struct RangeInertialParams {
     /// Standard deviation of a range.

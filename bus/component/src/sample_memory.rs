@@ -7,26 +7,26 @@ use crate::schema::Schema;
 
 /// Samples by port.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct SampleMemory {
+pub struct SampleMemory {
     /// Sizes in bytes of the messages that can be written, by port; empty if none is written.
     sizes: Vec<usize>,
-    pub(crate) samples: Vec<Option<Box<[u64]>>>,
+    pub samples: Vec<Option<Box<[u64]>>>,
 }
 
 impl SampleMemory {
     /// An empty memory, to be written to ports of `schemas`.
-    pub(crate) fn empty(schemas: impl Iterator<Item = &'static Schema>) -> Self {
+    pub fn empty(schemas: impl Iterator<Item = &'static Schema>) -> Self {
         let sizes: Vec<usize> = schemas.map(|schema| schema.size).collect();
         Self { samples: vec![None; sizes.len()], sizes }
     }
 
     /// A memory with `samples`, to be read.
-    pub(crate) fn given(samples: Vec<Option<Box<[u64]>>>) -> Self {
+    pub fn given(samples: Vec<Option<Box<[u64]>>>) -> Self {
         Self { sizes: Vec::new(), samples }
     }
 
     /// The samples of `outputs`.
-    pub(crate) fn of<O: OutputPorts>(outputs: O) -> Self {
+    pub fn of<O: OutputPorts>(outputs: O) -> Self {
         let mut memory = Self::empty(O::DECLARED.iter().map(|port| port.schema));
         let written = outputs.write(&mut OutputSamples(&mut memory));
         written.unwrap_or_else(|error| unreachable!("this memory is there: {error}"));
@@ -63,7 +63,7 @@ impl SampleSink for SampleMemory {
 }
 
 /// A sample of zeros whose message has `size` bytes.
-pub(crate) fn empty_sample(size: usize) -> Box<[u64]> {
+pub fn empty_sample(size: usize) -> Box<[u64]> {
     let mut words = vec![0; sample_words(size)].into_boxed_slice();
     words[0] = ENCAPSULATION_WORD;
     words

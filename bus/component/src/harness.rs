@@ -1,7 +1,7 @@
 //! A component stepped without a run: for tests, and for uses that need its numbers alone.
 
-use crate::component::{Component, State, StepError};
 use crate::context::{NodeContext, StepContext};
+use crate::interface::{Component, State, StepError};
 use crate::ports::{OutputNumber, OutputPorts, SampleSource};
 use crate::registration::make_of;
 use crate::sample_memory::SampleMemory;

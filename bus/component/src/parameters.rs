@@ -1,7 +1,7 @@
 //! Parameters of a component: declared once, with unit, default, range and documentation.
 //!
 //! ```
-//! use bus::Parameters;
+//! use component::Parameters;
 //! use diagnostics::parameter::positive;
 //!
 //! /// Gains of a controller of the altitude.
@@ -20,7 +20,7 @@
 //! assert_eq!((hover.doc, hover.default.text().as_str()), ("Thrust at hover.", "required"));
 //! let gains: Gains = diagnostics::read(&serde_json::json!({ "hover": 4.9, "altitude_1_s": -1.0 }))?;
 //! assert!(gains.validate().is_err());
-//! # Ok::<(), bus::ParameterError>(())
+//! # Ok::<(), component::ParameterError>(())
 //! ```
 
 use diagnostics::ParameterError;
@@ -29,7 +29,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// The content of a `parameters` table; `#[derive(bus::Parameters)]` implements it.
+/// The content of a `parameters` table; `#[derive(component::Parameters)]` implements it.
 pub trait Parameters: DeserializeOwned {
     /// The parameters, in the order in which they are documented.
     const DECLARED: &'static [Parameter];
@@ -76,7 +76,7 @@ fn faults_within<P: Parameters>(rest: &mut Value) -> Vec<ParameterError> {
 ///
 /// ```
 /// let table = serde_json::json!({ "roll": "x", "pitch": 1.0, "yaw": true });
-/// let read = bus::parameters::read::<std::collections::BTreeMap<String, f64>>(&table);
+/// let read = component::parameters::read::<std::collections::BTreeMap<String, f64>>(&table);
 /// let keys: Vec<String> = read.unwrap_err().into_each().iter().map(|error| error.key().to_owned()).collect();
 /// assert_eq!(keys, ["roll", "yaw"]);
 /// ```
@@ -183,7 +183,7 @@ impl DefaultValue {
 /// The parameters in `declared` with the keys of their tables, by dotted key, each table before its keys.
 ///
 /// ```
-/// let keys: Vec<String> = bus::parameters::dotted(&[]).into_iter().map(|(key, _)| key).collect();
+/// let keys: Vec<String> = component::parameters::dotted(&[]).into_iter().map(|(key, _)| key).collect();
 /// assert!(keys.is_empty());
 /// ```
 #[must_use]
@@ -277,7 +277,7 @@ mod tests {
         FileKind { others: |_, path| vec![path.with_extension("csv")], ..FileKind::of(FileRole::Settings) };
 
     /// A table that names files, and has a value for the start.
-    #[derive(bus::Parameters)]
+    #[derive(component::Parameters)]
     #[allow(dead_code, reason = "only the declarations are read")]
     struct Named {
         /// Flights.
@@ -291,7 +291,7 @@ mod tests {
     }
 
     /// A table with all kinds of fields.
-    #[derive(Debug, PartialEq, bus::Parameters)]
+    #[derive(Debug, PartialEq, component::Parameters)]
     #[parameters(default)]
     struct Gains {
         /// Offset of each axis.
@@ -312,7 +312,7 @@ mod tests {
     }
 
     /// A table within.
-    #[derive(Debug, PartialEq, bus::Parameters)]
+    #[derive(Debug, PartialEq, component::Parameters)]
     struct Stream {
         /// Rate.
         #[parameter(check = positive)]

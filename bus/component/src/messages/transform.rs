@@ -13,7 +13,7 @@ const POSE_BYTES: usize = POSE_NUMBERS * size_of::<f64>();
 /// Name of a frame: 1 to 63 bytes of printable ASCII.
 ///
 /// ```
-/// use bus::messages::FrameName;
+/// use component::messages::FrameName;
 ///
 /// let frame = FrameName::new("h1/body").unwrap();
 /// assert_eq!(frame.as_str(), "h1/body");
@@ -47,7 +47,7 @@ impl FrameName {
 /// Frame of the body of a vehicle, as plants publish it: `NAME/body`; of a vehicle without a name `hb_body`.
 ///
 /// ```
-/// use bus::messages::body_frame;
+/// use component::messages::body_frame;
 ///
 /// assert_eq!((&*body_frame("h1"), &*body_frame("")), ("h1/body", "hb_body"));
 /// ```
@@ -59,7 +59,7 @@ pub fn body_frame(vehicle: &str) -> String {
 /// One transform from `map` to the frame of a vehicle's body, byte-identical to a ROS 2 `TFMessage` with one element.
 ///
 /// ```
-/// use bus::messages::{BodyTransform, FrameName, Orientation, Point};
+/// use component::messages::{BodyTransform, FrameName, Orientation, Point};
 ///
 /// let (point, level) = (Point { x: 1.0, y: 2.0, z: 3.0 }, Orientation { x: 0.0, y: 0.0, z: 0.0, w: 1.0 });
 /// let transform = BodyTransform::new(&FrameName::new("h1/body").unwrap(), point, level);

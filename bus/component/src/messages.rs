@@ -3,7 +3,7 @@
 //! Frames: `world` is z up; `body` is x forward, y left, z up, its origin in the centre of mass.
 //!
 //! ```
-//! use bus::messages::{PlantState, Vector3};
+//! use component::messages::{PlantState, Vector3};
 //!
 //! let state = PlantState { position: Vector3 { z: 1.5, ..Vector3::default() }, ..PlantState::default() };
 //! assert_eq!(state.attitude.w, 1.0, "level by default");
@@ -33,7 +33,7 @@ pub const ROTORS_MAX: usize = 12;
 /// A number for each rotor of a vehicle, in the order of its vehicle file.
 ///
 /// ```
-/// use bus::messages::{MotorCommand, PerRotor};
+/// use component::messages::{MotorCommand, PerRotor};
 ///
 /// let hexacopter = MotorCommand { command: PerRotor::filled(6, 76.5), ..MotorCommand::default() };
 /// assert_eq!(hexacopter.command.len(), 6);
@@ -45,7 +45,7 @@ pub type PerRotor = Bounded<f64, ROTORS_MAX>;
 /// Simulation time as ROS 2 writes it. The bus fills it in when a sample is sent.
 ///
 /// ```
-/// let time = bus::messages::Time::from_ns(1_500_000_000);
+/// let time = component::messages::Time::from_ns(1_500_000_000);
 /// assert_eq!((time.sec, time.nanosec), (1, 500_000_000));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Message)]
@@ -72,7 +72,7 @@ impl Time {
 /// Three numbers along the axes of a frame.
 ///
 /// ```
-/// let position = bus::messages::Vector3::from([1.0, 2.0, 3.0]);
+/// let position = component::messages::Vector3::from([1.0, 2.0, 3.0]);
 /// assert_eq!(position.z, 3.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -106,7 +106,7 @@ impl From<Vector3> for [f64; 3] {
 ///
 /// ```
 /// // Level, and turned nowhere.
-/// let bus::messages::Quaternion { x, y, z, w } = Default::default();
+/// let component::messages::Quaternion { x, y, z, w } = Default::default();
 /// assert_eq!([x, y, z, w], [0.0, 0.0, 0.0, 1.0]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Message)]

@@ -8,10 +8,10 @@ use std::marker::PhantomData;
 /// A port of a component.
 ///
 /// ```
-/// use bus::messages::Imu;
-/// use bus::ports::OutputPorts;
+/// use component::messages::Imu;
+/// use component::ports::OutputPorts;
 ///
-/// #[derive(bus::OutputPorts)]
+/// #[derive(component::OutputPorts)]
 /// struct Outputs {
 ///     /// What the sensor measured.
 ///     imu: Imu,
@@ -97,16 +97,16 @@ pub enum Inputs {
     },
 }
 
-/// The inputs of a component at one tick; implement it with `#[derive(bus::InputPorts)]`.
+/// The inputs of a component at one tick; implement it with `#[derive(component::InputPorts)]`.
 ///
 /// Each field is a port of the same name: `&'a T` one that must be wired, `Option<&'a T>` one that may be left out.
 /// A component whose inputs the manifest names takes [`Many`] or [`AnyInputs`], one without inputs `()`.
 ///
 /// ```
-/// use bus::messages::{Gps, Imu};
-/// use bus::ports::{InputPorts, Inputs};
+/// use component::messages::{Gps, Imu};
+/// use component::ports::{InputPorts, Inputs};
 ///
-/// #[derive(bus::InputPorts)]
+/// #[derive(component::InputPorts)]
 /// struct Measurements<'a> {
 ///     /// At every tick.
 ///     imu: &'a Imu,
@@ -124,16 +124,16 @@ pub trait InputPorts<'a>: Sized {
     fn read(samples: InputSamples<'a>) -> Self;
 }
 
-/// The outputs of a component at one tick; implement it with `#[derive(bus::OutputPorts)]`.
+/// The outputs of a component at one tick; implement it with `#[derive(component::OutputPorts)]`.
 ///
 /// Each field is a port of the same name: `T` one that is always there, `Option<T>` one that is there where the
 /// manifest names it. An output that is not there or not due is dropped; a due output that is `None` ends the run.
 ///
 /// ```
-/// use bus::messages::{ControlStatus, MotorCommand};
-/// use bus::ports::OutputPorts;
+/// use component::messages::{ControlStatus, MotorCommand};
+/// use component::ports::OutputPorts;
 ///
-/// #[derive(bus::OutputPorts)]
+/// #[derive(component::OutputPorts)]
 /// struct Answer {
 ///     command: MotorCommand,
 ///     status: Option<ControlStatus>,
@@ -156,10 +156,11 @@ pub trait OutputPorts: Sized {
 
 /// The samples that a step may read, by the numbers of its ports.
 #[derive(Clone, Copy)]
-pub struct InputSamples<'a>(pub(crate) &'a dyn SampleSource);
+pub struct InputSamples<'a>(#[doc(hidden)] pub &'a dyn SampleSource);
 
 /// Source of samples: the bus, or the caller that steps a component without it.
-pub(crate) trait SampleSource {
+#[doc(hidden)]
+pub trait SampleSource {
     /// Number of ports.
     fn count(&self) -> usize;
     /// The newest sample of a port; `None` where that is not wired.
@@ -192,10 +193,11 @@ impl<'a> InputSamples<'a> {
 
 /// Samples that a step may write, by the numbers of its ports: the declared ones first, then those of
 /// [`Inputs::Forwarded`] in the order of their names.
-pub struct OutputSamples<'a>(pub(crate) &'a mut dyn SampleSink);
+pub struct OutputSamples<'a>(#[doc(hidden)] pub &'a mut dyn SampleSink);
 
 /// Destination of samples: the bus, or the caller that steps a component without it.
-pub(crate) trait SampleSink {
+#[doc(hidden)]
+pub trait SampleSink {
     /// The words of a port's sample; `None` where that is not wired or not due.
     fn words(&mut self, port: usize) -> Result<Option<&mut [u64]>, BusError>;
 }
@@ -314,8 +316,8 @@ impl OutputPorts for () {
 /// One or more inputs of one message, in the order of the names that the manifest gives them.
 ///
 /// ```
-/// use bus::messages::PlantState;
-/// use bus::ports::{InputPorts, Inputs, Many};
+/// use component::messages::PlantState;
+/// use component::ports::{InputPorts, Inputs, Many};
 ///
 /// /// The height of the highest of all vehicles that the manifest wires.
 /// fn highest_m(vehicles: &Many<'_, PlantState>) -> f64 {
@@ -381,7 +383,7 @@ impl<'a> InputPorts<'a> for AnyInputs<'a> {
 /// outputs of the same names ([`OutputSamples::write_bytes`]), and a message keeps the stamp of its first sender.
 ///
 /// ```
-/// use bus::ports::ForwardedInputs;
+/// use component::ports::ForwardedInputs;
 /// /// The bytes of the first input's message, if that is a new one.
 /// fn first_new<'a>(inputs: &ForwardedInputs<'a>, last_tick: Option<u64>) -> Option<&'a [u8]> {
 ///     (inputs.sent_tick(0) > last_tick).then(|| inputs.newest(0))

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Ticks at which the samples of a topic are sent.
 ///
 /// ```
-/// use bus::sample_ticks::SampleTicks;
+/// use component::sample_ticks::SampleTicks;
 ///
 /// // 10 measurements a second at a tick of 1 ms, each 80 ms late.
 /// let gps = SampleTicks::measured(1, 1_000_000, 100_000_000, 80_000_000);

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Information about a component's node and run, and the list of its warnings.
 ///
 /// ```
-/// let context = bus::context::NodeContext::new("imu", &["state"]).timed(1_000_000, 4, 30_000).seeded(7);
+/// let context = component::context::NodeContext::new("imu", &["state"]).timed(1_000_000, 4, 30_000).seeded(7);
 /// assert!(context.has("state") && !context.has("wind"));
 /// assert_eq!((context.rate_hz(), context.period_s(), context.duration_s()), (1000, 0.004, 30.0));
 ///
@@ -47,7 +47,7 @@ pub struct NodeContext<'a> {
 /// Message type of an input.
 ///
 /// ```
-/// use bus::context::{InputMessage, NodeContext};
+/// use component::context::{InputMessage, NodeContext};
 /// let inputs = ["estimate"];
 /// let messages = [InputMessage { port: "estimate", bytes: 96, period_ticks: 4.0, initial: None }];
 /// let context = NodeContext::new("down", &inputs).reading(&messages);
@@ -69,7 +69,7 @@ impl InputMessage<'_> {
     /// Number of values that the initial message has in its array `field`; `None` without an initial message.
     ///
     /// ```
-    /// # use bus::context::InputMessage;
+    /// # use component::context::InputMessage;
     /// let initial = serde_json::json!({ "command": [76.5, 76.5, 76.5, 76.5] });
     /// let input = InputMessage { port: "command", bytes: 112, period_ticks: 1.0, initial: Some(&initial) };
     /// assert_eq!(input.initial_count("command"), Some(4));
@@ -220,7 +220,7 @@ impl<'a> NodeContext<'a> {
     /// States the times of the node's samples.
     ///
     /// ```
-    /// # use bus::context::{NodeContext, SampleTimes};
+    /// # use component::context::{NodeContext, SampleTimes};
     /// let context = NodeContext::new("gps", &["state"]);
     /// context.state_times(SampleTimes { measured_every_s: Some(0.1), delay_s: 0.08, ..Default::default() });
     /// assert_eq!(context.times().measured_every_s, Some(0.1));
@@ -245,14 +245,19 @@ impl<'a> NodeContext<'a> {
 /// Information for a step about its tick, beside the inputs.
 #[derive(Clone, Copy)]
 pub struct StepContext<'a> {
-    pub(crate) tick: u32,
-    pub(crate) time_ns: u64,
+    #[doc(hidden)]
+    pub tick: u32,
+    #[doc(hidden)]
+    pub time_ns: u64,
     /// Ticks whose steps write a sample, by output; `None` for outputs that are not wired.
-    pub(crate) sends: &'a [Option<SampleTicks>],
+    #[doc(hidden)]
+    pub sends: &'a [Option<SampleTicks>],
     /// Last samples of the predecessor, by output.
-    pub(crate) predecessor: Option<&'a dyn SampleSource>,
+    #[doc(hidden)]
+    pub predecessor: Option<&'a dyn SampleSource>,
     /// Value of the program that steps the simulation.
-    pub(crate) given: Option<&'a dyn Any>,
+    #[doc(hidden)]
+    pub given: Option<&'a dyn Any>,
 }
 
 impl std::fmt::Debug for StepContext<'_> {
@@ -303,8 +308,7 @@ impl StepContext<'_> {
         self.predecessor.and_then(|sent| O::read(InputSamples(sent)))
     }
 
-    /// The value that [`Simulation::step_given`](crate::Simulation::step_given) got; `None` in other runs, and if it is of another
-    /// type.
+    /// The value that `Simulation::step_given` of the bus got; `None` in other runs, and if it is of another type.
     #[must_use]
     pub fn given<T: Any>(&self) -> Option<&T> {
         self.given?.downcast_ref()

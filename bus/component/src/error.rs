@@ -8,9 +8,8 @@ use thiserror::Error;
 /// An error of the bus; its text names the node, the topic and the remedy.
 ///
 /// ```
-/// // A node that nobody launched says so, and what to do.
-/// let error = bus::dynamic::DynamicNode::join().unwrap_err();
-/// assert!(matches!(error, bus::BusError::NotInARun { .. }));
+/// // The error of a node that nobody launched says what to do.
+/// let error = component::BusError::NotInARun { variable: "HUMMINGBUS_RUN" };
 /// assert!(error.to_string().contains("hummingbus run MANIFEST"));
 /// ```
 #[derive(Error)]
@@ -375,7 +374,7 @@ impl BusError {
     /// True if the operating system or the transport refused a request: a file, memory or a right.
     ///
     /// ```
-    /// let error = bus::BusError::FileLimit { needed: 1 << 20, limit: 1 << 10 };
+    /// let error = component::BusError::FileLimit { needed: 1 << 20, limit: 1 << 10 };
     /// assert!(error.is_system() && !error.is_input() && !error.is_component());
     /// ```
     #[must_use]
@@ -464,7 +463,7 @@ impl BusError {
 ///
 /// ```
 /// let reason = "the gyroscope is stuck".to_owned();
-/// let error = bus::BusError::Step { node: "imu".to_owned(), tick: 7, time_s: 0.07, reason };
+/// let error = component::BusError::Step { node: "imu".to_owned(), tick: 7, time_s: 0.07, reason };
 /// let error = diagnostics::Error::from(error);
 /// assert!(error.is_component() && error.process() == Some("imu"));
 /// ```

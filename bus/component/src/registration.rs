@@ -1,18 +1,15 @@
 //! A component in a table of components: its declaration, and how one is made, without its type.
 
 use crate::announcement::Announcement;
-use crate::component::{Component, FirstFailure, Info, Role, State, StateError, StepError, Transfer};
 use crate::context::{NodeContext, StepContext};
+use crate::interface::{Component, FirstFailure, Info, Role, State, StateError, StepError, Transfer};
 use crate::parameters::{self, Parameter, Parameters};
-use crate::plan::{NodePlan, Plan};
 use crate::ports::{InputPorts, InputSamples, Inputs, OutputPorts, OutputSamples, PortSpec};
 use crate::sample_ticks::SampleTicks;
 use crate::schema::Schema;
-use crate::state_transfer::StateLayout;
 use diagnostics::ParameterError;
-use inputs::{FileKind, InputFiles};
+use inputs::FileKind;
 use serde_json::Value;
-use std::path::Path;
 
 /// A component in a table of components, with everything that a launcher must know about it.
 #[derive(Clone, Copy, Debug)]
@@ -138,43 +135,17 @@ impl Registration {
         errors.into_iter().filter(|error| matches!(error, ParameterError::File { .. })).collect()
     }
 
-    /// True if the component, as `node` of `plan`, goes on in flight from the state of `before` as `node_before`; the run has read
-    /// `files`.
+    /// The component, made of `parameters` for the node that `context` describes.
     ///
     /// # Errors
-    /// If one of the two cannot be made.
-    pub fn goes_on_from(
+    /// The parameters or files that are not valid.
+    #[doc(hidden)]
+    pub fn make(
         &self,
-        node: &NodePlan,
-        (before, node_before): (&Self, &NodePlan),
-        plan: &Plan,
-        files: &InputFiles,
-    ) -> Result<bool, ParameterError> {
-        let layout = |component: &Self, node| -> Result<Option<StateLayout>, ParameterError> {
-            let made = component.make_for(plan, node, files, None)?;
-            Ok(StateLayout::of(component.transfer, made.state_size(), made.configuration()))
-        };
-        let (after, before) = (layout(self, node)?, layout(before, node_before)?);
-        Ok(after.is_some() && after == before)
-    }
-
-    /// The component, made for `node` of `plan` from the run's `files`; `run_dir` is the directory of the run, if it has one.
-    pub(crate) fn make_for(
-        &self,
-        plan: &Plan,
-        node: &NodePlan,
-        files: &InputFiles,
-        run_dir: Option<&Path>,
+        parameters: &Value,
+        context: &NodeContext<'_>,
     ) -> Result<Box<dyn Instance>, ParameterError> {
-        let inputs: Vec<&str> = node.inputs.iter().map(|input| input.port.as_str()).collect();
-        let outputs: Vec<&str> = node.outputs.iter().map(|output| output.port.as_str()).collect();
-        let context = NodeContext::new(&node.name, &inputs)
-            .naming(&outputs)
-            .timed(plan.tick_ns, node.period_ticks, plan.duration_ticks)
-            .seeded(plan.seed)
-            .given(files)
-            .in_run(run_dir);
-        (self.make)(&node.parameters, &context)
+        (self.make)(parameters, context)
     }
 
     /// The messages of its ports.
@@ -208,7 +179,8 @@ pub(crate) fn make_of<C: Component>(
 }
 
 /// A component with its state, without their types. Its steps do not allocate.
-pub(crate) trait Instance: Send {
+#[doc(hidden)]
+pub trait Instance: Send {
     /// As [`State::configuration`].
     fn configuration(&self) -> u64;
     /// As [`State::size`].

@@ -80,7 +80,7 @@ pub enum Kind {
 /// Numbers behind a string, placed as CDR places them.
 ///
 /// ```
-/// use bus::schema::{Numbers, Primitive};
+/// use component::schema::{Numbers, Primitive};
 ///
 /// assert_eq!(Numbers::doubles(7).room(), 56);
 /// let with_a_byte = Numbers { leading_bytes: 1, primitive: Primitive::F32, count: 5 };
@@ -174,8 +174,8 @@ pub const fn sequences_are_last(fields: &[Field]) -> bool {
 /// Part of a message's bytes that counts: up to the end of its sequence, or of the numbers behind its name.
 ///
 /// ```
-/// use bus::Message;
-/// use bus::messages::SetPoint;
+/// use component::Message;
+/// use component::messages::SetPoint;
 ///
 /// assert!(SetPoint::SCHEMA.extent().is_none(), "its messages are all of one length");
 /// ```
@@ -206,7 +206,8 @@ const fn double_bytes() -> usize {
 }
 
 /// Bytes from the start of a [`Bounded`](crate::Bounded) to its first value.
-pub(crate) const VALUES_START: usize = 8;
+#[doc(hidden)]
+pub const VALUES_START: usize = 8;
 /// Bytes from the start of a string to its first character.
 pub(crate) const NAME_START: usize = 4;
 /// Bytes of CDR's encapsulation header.
@@ -230,7 +231,9 @@ impl Extent {
     }
 
     /// The place of the numbers behind the values of `message`.
-    pub(crate) fn tail_of(&self, message: &[u8]) -> Range<usize> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn tail_of(&self, message: &[u8]) -> Range<usize> {
         self.tail(self.count(message))
     }
 
@@ -255,12 +258,15 @@ impl Extent {
     }
 
     /// Sets the count of `message`, which has room for all values.
-    pub(crate) fn set_count(&self, message: &mut [u8], count: u32) {
+    #[doc(hidden)]
+    pub fn set_count(&self, message: &mut [u8], count: u32) {
         message[self.count_offset..][..size_of::<u32>()].copy_from_slice(&count.to_le_bytes());
     }
 
     /// The count of `message`, if it is more than there is room for or if a value behind it is not zero.
-    pub(crate) fn wrong_count(&self, message: &[u8]) -> Option<usize> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn wrong_count(&self, message: &[u8]) -> Option<usize> {
         let count = self.count(message);
         let is_right = || message[self.tail(count).end..].iter().all(|byte| *byte == 0);
         (count > self.values_max || !is_right()).then_some(count)
@@ -307,9 +313,9 @@ pub struct Field {
 /// A message's type, made by `#[derive(Message)]`.
 ///
 /// ```
-/// use bus::Message;
+/// use component::Message;
 ///
-/// let schema = bus::messages::SetPoint::SCHEMA;
+/// let schema = component::messages::SetPoint::SCHEMA;
 /// let altitude = schema.fields.iter().find(|field| field.name == "altitude").unwrap();
 /// assert_eq!((altitude.unit, altitude.frame, altitude.offset), ("m", "world", 8));
 /// ```

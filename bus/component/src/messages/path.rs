@@ -12,7 +12,7 @@ const POSES_BYTES: usize = FIRST_PAD + PlannedPath::POSES_MAX * size_of::<PoseSt
 /// Poses that lie ahead, each with its time; byte-identical to a ROS 2 `nav_msgs/msg/Path` in the frame `map`.
 ///
 /// ```
-/// use bus::messages::{PlannedPath, Point, Pose, Time};
+/// use component::messages::{PlannedPath, Point, Pose, Time};
 ///
 /// let pose = |x| Pose { position: Point { x, y: 0.0, z: 1.0 }, ..Pose::default() };
 /// let path = PlannedPath::new([(Time::from_ns(0), pose(0.0)), (Time::from_ns(100_000_000), pose(0.2))]);

@@ -39,7 +39,7 @@ pub const RC_CHANNELS_MAX: usize = 16;
 /// The channels of a remote control, as its receiver reports them.
 ///
 /// ```
-/// use bus::messages::RcChannels;
+/// use component::messages::RcChannels;
 ///
 /// let centred = RcChannels { pulse: [1500.0, 1500.0, 1000.0, 1500.0].into(), ..RcChannels::default() };
 /// assert_eq!(centred.pulse.len(), 4);

@@ -10,7 +10,7 @@ use std::ops::{Deref, DerefMut};
 /// `float64[<=N]` of ROS 2: a recording holds the message up to the last value that counts.
 ///
 /// ```
-/// use bus::Bounded;
+/// use component::Bounded;
 ///
 /// let mut speeds = Bounded::<f64, 12>::from([400.0, 410.0, 420.0, 430.0]);
 /// speeds[3] = 440.0;
@@ -22,7 +22,7 @@ use std::ops::{Deref, DerefMut};
 ///
 /// More values than there is room for do not compile:
 /// ```compile_fail,E0080
-/// let _ = bus::Bounded::<f64, 2>::from([1.0, 2.0, 3.0]);
+/// let _ = component::Bounded::<f64, 2>::from([1.0, 2.0, 3.0]);
 /// ```
 #[derive(Clone, Copy)]
 #[repr(C)]

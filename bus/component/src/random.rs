@@ -13,8 +13,8 @@ use rand_core::{Rng, SeedableRng};
 /// The generator behind every node's noise.
 ///
 /// ```
-/// let mut imu = bus::random::stream(7, "imu");
-/// let drawn: f64 = (0..1000).map(|_| bus::random::normal(&mut imu)).sum();
+/// let mut imu = component::random::stream(7, "imu");
+/// let drawn: f64 = (0..1000).map(|_| component::random::normal(&mut imu)).sum();
 /// assert!((drawn / 1000.0).abs() < 0.1, "the mean of 1000 draws is near 0");
 /// ```
 pub type Stream = ChaCha8Rng;
@@ -40,7 +40,7 @@ pub fn stream(run_seed: u64, node: &str) -> Stream {
 /// tick.
 ///
 /// ```
-/// use bus::random::{at, normal, stream};
+/// use component::random::{at, normal, stream};
 ///
 /// let imu = stream(7, "imu");
 /// let mut random = imu.clone();

@@ -6,13 +6,13 @@
 
 use crate::schema::Schema;
 
-/// A fixed-layout message; implement it with `#[derive(bus::Message)]`.
+/// A fixed-layout message; implement it with `#[derive(component::Message)]`.
 ///
 /// ```
-/// use bus::messages::Time;
+/// use component::messages::Time;
 ///
 /// /// Voltage of a battery.
-/// #[derive(Clone, Copy, bus::Message)]
+/// #[derive(Clone, Copy, component::Message)]
 /// #[repr(C)]
 /// #[message(type_name = "my_msgs/msg/Battery")]
 /// struct Battery {
@@ -21,13 +21,13 @@ use crate::schema::Schema;
 ///     #[field(unit = "V")]
 ///     voltage: f64,
 /// }
-/// assert!(<Battery as bus::Message>::SCHEMA.ros2_definition().contains("float64 voltage  # [V]"));
+/// assert!(<Battery as component::Message>::SCHEMA.ros2_definition().contains("float64 voltage  # [V]"));
 /// ```
 ///
 /// Implicit padding does not compile:
 /// ```compile_fail,E0080
-/// # use bus::messages::Time;
-/// #[derive(Clone, Copy, bus::Message)]
+/// # use component::messages::Time;
+/// #[derive(Clone, Copy, component::Message)]
 /// #[repr(C)]
 /// #[message(type_name = "my_msgs/msg/Padded")]
 /// struct Padded {
@@ -38,7 +38,7 @@ use crate::schema::Schema;
 ///
 /// Nor does a number without a unit:
 /// ```compile_fail
-/// #[derive(Clone, Copy, bus::Message)]
+/// #[derive(Clone, Copy, component::Message)]
 /// #[repr(C)]
 /// #[message(type_name = "my_msgs/msg/Unitless")]
 /// struct Unitless {
@@ -48,12 +48,12 @@ use crate::schema::Schema;
 ///
 /// A [`Bounded`](crate::Bounded), a sequence of numbers, is the last field:
 /// ```compile_fail,E0080
-/// #[derive(Clone, Copy, bus::Message)]
+/// #[derive(Clone, Copy, component::Message)]
 /// #[repr(C)]
 /// #[message(type_name = "my_msgs/msg/Cells")]
 /// struct Cells {
 ///     #[field(unit = "V")]
-///     voltage: bus::Bounded<f64, 12>,
+///     voltage: component::Bounded<f64, 12>,
 ///     flags: u64,
 /// }
 /// ```
@@ -68,11 +68,13 @@ pub const CDR_START: usize = 4;
 pub const BODY_START: usize = 8;
 
 /// The first word of every sample: four reserved bytes, then `00 01 00 00`.
-pub(crate) const ENCAPSULATION_WORD: u64 = u64::from_le_bytes([0, 0, 0, 0, 0, 1, 0, 0]);
+#[doc(hidden)]
+pub const ENCAPSULATION_WORD: u64 = u64::from_le_bytes([0, 0, 0, 0, 0, 1, 0, 0]);
 
 /// Words in a sample whose message has `size` bytes.
+#[doc(hidden)]
 #[must_use]
-pub(crate) const fn sample_words(size: usize) -> usize {
+pub const fn sample_words(size: usize) -> usize {
     1 + size.div_ceil(8)
 }
 
@@ -80,23 +82,28 @@ pub(crate) const fn sample_words(size: usize) -> usize {
 ///
 /// # Panics
 /// If the sample is shorter than the message; joining a run checks both sides' layouts.
+#[doc(hidden)]
 #[must_use]
-pub(crate) fn view<T: Message>(words: &[u64]) -> &T {
+pub fn view<T: Message>(words: &[u64]) -> &T {
     bytemuck::from_bytes(&bytemuck::cast_slice(&words[1..])[..T::SCHEMA.size])
 }
 
 /// As [`view`], for writing.
-pub(crate) fn view_mut<T: Message>(words: &mut [u64]) -> &mut T {
+#[doc(hidden)]
+pub fn view_mut<T: Message>(words: &mut [u64]) -> &mut T {
     bytemuck::from_bytes_mut(&mut bytemuck::cast_slice_mut(&mut words[1..])[..T::SCHEMA.size])
 }
 
 /// The bytes that a recording holds: the encapsulation header and a message of `size` bytes.
+#[doc(hidden)]
 #[must_use]
-pub(crate) fn cdr_bytes(words: &[u64], size: usize) -> &[u8] {
+pub fn cdr_bytes(words: &[u64], size: usize) -> &[u8] {
     &bytemuck::cast_slice(words)[CDR_START..BODY_START + size]
 }
 
 /// The bytes of a message of `size` bytes alone.
-pub(crate) fn message_bytes(words: &[u64], size: usize) -> &[u8] {
+#[doc(hidden)]
+#[must_use]
+pub fn message_bytes(words: &[u64], size: usize) -> &[u8] {
     &bytemuck::cast_slice(words)[BODY_START..BODY_START + size]
 }

@@ -12,7 +12,7 @@ pub use crate::state::{State, StateError, Transfer};
 /// Error of a step, in words. Any error, and any text, becomes one by `?` or `into`.
 ///
 /// ```
-/// let too_low: bus::component::StepError = "the battery is empty".into();
+/// let too_low: component::component::StepError = "the battery is empty".into();
 /// assert_eq!(too_low.to_string(), "the battery is empty");
 /// ```
 pub type StepError = Box<dyn std::error::Error + Send + Sync>;
@@ -26,25 +26,25 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 /// ([`Harness`](crate::Harness)) and a thread can host it.
 ///
 /// ```
-/// use bus::component::{Component, Info, StepError};
-/// use bus::context::{NodeContext, StepContext};
-/// use bus::messages::{PlantState, SetPoint};
+/// use component::component::{Component, Info, StepError};
+/// use component::context::{NodeContext, StepContext};
+/// use component::messages::{PlantState, SetPoint};
 ///
 /// /// Asks for a hover at the height at which the vehicle is, and some more.
 /// struct Climb(Parameters);
 ///
-/// #[derive(bus::Parameters)]
+/// #[derive(component::Parameters)]
 /// struct Parameters {
 ///     /// Height above the vehicle.
 ///     more_m: f64,
 /// }
 ///
-/// #[derive(bus::InputPorts)]
+/// #[derive(component::InputPorts)]
 /// struct Inputs<'a> {
 ///     state: &'a PlantState,
 /// }
 ///
-/// #[derive(bus::OutputPorts)]
+/// #[derive(component::OutputPorts)]
 /// struct Outputs {
 ///     set_point: SetPoint,
 /// }
@@ -56,7 +56,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 ///     type Outputs = Outputs;
 ///     type State = ();
 ///
-///     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
+///     fn new(parameters: Parameters, _: &NodeContext<'_>) -> Result<Self, component::ParameterError> {
 ///         Ok(Self(parameters))
 ///     }
 ///
@@ -73,7 +73,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 ///     }
 /// }
 ///
-/// let mut climb = bus::Harness::<Climb>::new(Parameters { more_m: 0.5 }).unwrap();
+/// let mut climb = component::Harness::<Climb>::new(Parameters { more_m: 0.5 }).unwrap();
 /// let state = PlantState { position: [0.0, 0.0, 2.0].into(), ..Default::default() };
 /// assert_eq!(climb.step(Inputs { state: &state }).unwrap().set_point.altitude, 2.5);
 /// ```
@@ -147,8 +147,8 @@ pub trait Component: Sized + Send {
     /// the run went on. It is asked for once, off the tick path.
     ///
     /// ```
-    /// use bus::component::{Component, Info, StepError};
-    /// use bus::context::{NodeContext, StepContext};
+    /// use component::component::{Component, Info, StepError};
+    /// use component::context::{NodeContext, StepContext};
     ///
     /// /// Finds no root in every fourth step, and takes the nearest number.
     /// struct Roots;
@@ -160,7 +160,7 @@ pub trait Component: Sized + Send {
     ///     type Outputs = ();
     ///     type State = Missed;
     ///
-    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
+    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, component::ParameterError> {
     ///         Ok(Self)
     ///     }
     ///
@@ -179,7 +179,7 @@ pub trait Component: Sized + Send {
     /// }
     ///
     /// /// Steps without a root.
-    /// #[derive(Clone, Copy, Debug, Default, bus::Message)]
+    /// #[derive(Clone, Copy, Debug, Default, component::Message)]
     /// #[repr(C)]
     /// #[message(type_name = "example_msgs/msg/Missed")]
     /// struct Missed {
@@ -187,7 +187,7 @@ pub trait Component: Sized + Send {
     ///     steps: u64,
     /// }
     ///
-    /// let mut roots = bus::Harness::<Roots>::from_json(&serde_json::json!({})).unwrap();
+    /// let mut roots = component::Harness::<Roots>::from_json(&serde_json::json!({})).unwrap();
     /// (0..8).for_each(|_| roots.step(()).unwrap());
     /// assert_eq!(roots.component().remark(&roots.state).as_deref(), Some("no root in 2 steps"));
     /// ```
@@ -207,7 +207,7 @@ pub trait Component: Sized + Send {
 /// Condition that cannot hold any more.
 ///
 /// ```
-/// use bus::component::Failure;
+/// use component::component::Failure;
 ///
 /// let failure = Failure { condition: "touches nothing".to_owned(), time_ns: 1_500_000 };
 /// assert_eq!(failure.time_ns / 1_000_000, 1, "tick 1 at 1 kHz");
@@ -226,7 +226,7 @@ pub type FirstFailure = fn(&[u8]) -> Option<Failure>;
 /// Description of a component.
 ///
 /// ```
-/// use bus::component::{Info, Role};
+/// use component::component::{Info, Role};
 ///
 /// const LOGGER: Info = Info::new("logger", "writes what it reads to a file").recorder();
 /// assert_eq!((LOGGER.name, LOGGER.role), ("logger", Role::Record));
@@ -266,7 +266,7 @@ impl Info {
     /// The same component, which takes the place of another one only if it goes on from its state; `reason` says why.
     ///
     /// ```
-    /// use bus::component::Info;
+    /// use component::component::Info;
     ///
     /// const WORLD: Info = Info::new("world", "moves bodies").needing_state("the bodies would be lost");
     /// assert!(WORLD.needs_state.is_some());

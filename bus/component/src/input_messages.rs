@@ -12,8 +12,8 @@ const ATTITUDES: [&str; 2] = [Quaternion::SCHEMA.type_name, Orientation::SCHEMA.
 /// Messages, at most one of each type, for callers that step components without knowing their ports.
 ///
 /// ```
-/// use bus::messages::{Gps, Imu, SetPoint};
-/// use bus::{InputMemory, InputMessages, InputPorts};
+/// use component::messages::{Gps, Imu, SetPoint};
+/// use component::{InputMemory, InputMessages, InputPorts};
 ///
 /// #[derive(InputPorts)]
 /// struct Measurements<'a> {
@@ -98,14 +98,14 @@ mod tests {
     use super::*;
     use crate::messages::{Imu, PlantState, Pose, SetPoint};
 
-    #[derive(bus::InputPorts)]
+    #[derive(component::InputPorts)]
     struct Two<'a> {
         first: &'a SetPoint,
         second: Option<&'a SetPoint>,
         imu: Option<&'a Imu>,
     }
 
-    #[derive(bus::InputPorts)]
+    #[derive(component::InputPorts)]
     struct One<'a> {
         imu: &'a Imu,
     }
@@ -121,7 +121,7 @@ mod tests {
         assert!(inputs.imu.is_none());
     }
 
-    #[derive(bus::InputPorts)]
+    #[derive(component::InputPorts)]
     struct Attitudes<'a> {
         state: &'a PlantState,
         pose: &'a Pose,

@@ -86,7 +86,7 @@ const _: () = assert!(
 /// Reading of an inertial measurement unit, byte-identical to a ROS 2 `sensor_msgs/msg/Imu` without an orientation.
 ///
 /// ```
-/// use bus::messages::{FrameName, StandardImu, Vector3};
+/// use component::messages::{FrameName, StandardImu, Vector3};
 ///
 /// let rest = Vector3 { z: 9.81, ..Vector3::default() };
 /// let imu = StandardImu::new(&FrameName::new("h1/body").unwrap(), Vector3::default(), 0.0, rest, 4e-3);
@@ -178,7 +178,7 @@ fn diagonal([x, y, z]: [f64; 3]) -> [f64; 9] {
 /// Pose in the world and velocity in the frame of a body, byte-identical to a ROS 2 `nav_msgs/msg/Odometry` of unknown covariance.
 ///
 /// ```
-/// use bus::messages::{FrameName, Odometry, Orientation, Point, Vector3};
+/// use component::messages::{FrameName, Odometry, Orientation, Point, Vector3};
 ///
 /// let (point, level) = (Point { x: 1.0, y: 2.0, z: 3.0 }, Orientation { x: 0.0, y: 0.0, z: 0.0, w: 1.0 });
 /// let ahead = Vector3 { x: 5.0, ..Vector3::default() };
@@ -283,7 +283,7 @@ impl Odometry {
 /// readers ignore it.
 ///
 /// ```
-/// use bus::messages::{FrameName, StandardRange};
+/// use component::messages::{FrameName, StandardRange};
 ///
 /// let down = FrameName::new("range/down").unwrap();
 /// let range = StandardRange::new(&down, StandardRange::ULTRASOUND, [0.17, 0.2, 7.65, 1.5, 1e-4]);
@@ -342,7 +342,7 @@ impl StandardRange {
 /// Readings of four rays in a plane, byte-identical to a ROS 2 `sensor_msgs/msg/LaserScan` without intensities.
 ///
 /// ```
-/// use bus::messages::{FrameName, LaserScan};
+/// use component::messages::{FrameName, LaserScan};
 ///
 /// let scan = LaserScan::new(&FrameName::new("h1/body").unwrap(), 0.1, [0.2, 7.65], [7.0, 4.0, 3.0, 6.0]);
 /// assert_eq!(scan.ranges(), [7.0, 4.0, 3.0, 6.0]);
@@ -424,7 +424,7 @@ impl FieldType for NoFrame {
 /// Commands of the motors, byte-identical to a ROS 2 `actuator_msgs/msg/Actuators` without positions and velocities.
 ///
 /// ```
-/// use bus::messages::{Actuators, PerRotor};
+/// use component::messages::{Actuators, PerRotor};
 ///
 /// let hover = Actuators::new(PerRotor::filled(4, 0.38));
 /// assert_eq!(hover.normalized, [0.38; 4]);

@@ -13,7 +13,7 @@ struct Span {
 
 /// Places of the floating-point numbers in a message.
 #[derive(Debug)]
-pub(crate) struct Floats {
+pub struct Floats {
     spans: Vec<Span>,
     /// The numbers behind the name that ends a message.
     named: Option<Extent>,
@@ -21,7 +21,7 @@ pub(crate) struct Floats {
 
 impl Floats {
     /// The floating-point numbers of `schema`.
-    pub(crate) fn of(schema: &Schema) -> Self {
+    pub fn of(schema: &Schema) -> Self {
         let named = schema.extent().filter(|extent| extent.tail_bytes > 0);
         let mut floats = Self { spans: Vec::new(), named };
         floats.add_message(schema, 0);
@@ -65,7 +65,7 @@ impl Floats {
     }
 
     /// The first number in the message `bytes` that is not finite: its place in bytes, and its value.
-    pub(crate) fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
+    pub fn first_not_finite(&self, bytes: &[u8]) -> Option<(usize, f64)> {
         let named = || {
             let named = self.named?;
             let place = named.tail_of(bytes);
@@ -100,7 +100,7 @@ fn number(bytes: &[u8]) -> f64 {
 }
 
 /// The field of `schema` at `offset` bytes, such as `position.z` or `command[2]`.
-pub(crate) fn field_at(schema: &Schema, offset: usize) -> String {
+pub fn field_at(schema: &Schema, offset: usize) -> String {
     let field = schema.fields.iter().rev().find(|field| field.offset <= offset);
     field.map_or_else(String::new, |field| {
         format!("{}{}", field.name, within(&field.kind, offset - field.offset))
