@@ -68,7 +68,8 @@
 //!
 //! | crate | content |
 //! |---|---|
-//! | [`bus`] | components, messages, the lockstep |
+//! | [`component`] | components, their ports, messages and parameters |
+//! | [`bus`] | the lockstep and the transport, and all of [`component`] again |
 //! | [`runtime`] | manifests, plans, the launcher |
 //! | [`recorder`] | recordings, written and read |
 //! | [`report`] | verdicts, figures and pages from recordings |
@@ -107,7 +108,8 @@ pub use runtime::launcher::{Launcher, Outcome};
 pub use runtime::manifest::{Composition, Manifest, ManifestBuilder};
 pub use runtime::simulate;
 pub use {
-    bus, controllers, flights, identify, inputs, plant, recorder, report, runtime, scenes, sensors, vehicles,
+    bus, component, controllers, flights, identify, inputs, plant, recorder, report, runtime, scenes,
+    sensors, vehicles,
 };
 
 use std::path::Path;

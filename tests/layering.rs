@@ -1,5 +1,6 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
-//! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes.
+//! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes,
+//! and components no transport.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -445,12 +446,46 @@ const OF_A_DOMAIN: [&str; 8] =
 #[test]
 fn what_launches_and_records_knows_no_domain() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for crate_ in ["bus", "recorder", "runtime"] {
+    for crate_ in ["bus", "bus/component", "recorder", "runtime"] {
         let text = fs::read_to_string(root.join(crate_).join("Cargo.toml")).unwrap();
         let manifest: toml::Table = text.parse().unwrap();
         let known = manifest["dependencies"].as_table().unwrap();
         let found: Vec<_> = OF_A_DOMAIN.iter().filter(|name| known.contains_key(**name)).collect();
         assert!(found.is_empty(), "{crate_} knows {found:?}: let the components declare it");
+    }
+}
+
+/// Packages whose components are compiled and tested without a transport.
+const WITHOUT_TRANSPORT: [&str; 4] =
+    ["hummingbus-component", "hummingbus-controllers", "hummingbus-plant", "hummingbus-sensors"];
+/// Packages of the transport, and what it needs of the system.
+const TRANSPORT: [&str; 4] = ["hummingbus-bus", "iceoryx2", "memmap2", "signal-hook"];
+
+#[test]
+fn components_are_compiled_without_a_transport() {
+    let lock = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.lock")).unwrap();
+    let lock: toml::Table = lock.parse().unwrap();
+    let mut needs: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for package in lock["package"].as_array().unwrap() {
+        let named = package.get("dependencies").and_then(toml::Value::as_array).into_iter().flatten();
+        // A version stands behind the name if the lock file has several.
+        let names = named.filter_map(|name| name.as_str()?.split(' ').next());
+        needs.entry(package["name"].as_str().unwrap()).or_default().extend(names);
+    }
+    let reached = |from: &'static str| {
+        let (mut reached, mut open) = (BTreeSet::new(), vec![from]);
+        while let Some(package) = open.pop() {
+            open.extend(needs[package].iter().filter(|next| reached.insert(**next)));
+        }
+        reached
+    };
+    assert!(
+        TRANSPORT.iter().all(|name| reached("hummingbus").contains(name)),
+        "{TRANSPORT:?} are other packages now"
+    );
+    for package in WITHOUT_TRANSPORT {
+        let found: Vec<_> = reached(package).into_iter().filter(|name| TRANSPORT.contains(name)).collect();
+        assert!(found.is_empty(), "{package} needs {found:?}: let it depend on hummingbus-component alone");
     }
 }
 

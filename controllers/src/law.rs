@@ -3,10 +3,9 @@
 use crate::airframe::ControlledVehicle;
 use crate::allocation::RotorWrench;
 use crate::control::{ControlOutput, Integrals};
-use component::Info;
-use component::Message;
 use component::context::NodeContext;
 use component::ports::InputPorts;
+use component::{Info, Message};
 use diagnostics::ParameterError;
 use std::path::{Path, PathBuf};
 

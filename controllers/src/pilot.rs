@@ -4,8 +4,7 @@ use crate::set_points::{ALTITUDES_EXPECTED, ALTITUDES_M, Schedule, SetPoint as V
 use crate::sticks::Sticks;
 use component::context::{NodeContext, StepContext};
 use component::messages::SetPoint;
-use component::{Component, Info, StepError};
-use component::{FileKind, OutputPorts};
+use component::{Component, FileKind, Info, OutputPorts, StepError};
 use diagnostics::nine_decimals;
 use diagnostics::parameter::{ParameterError, refuse};
 use std::collections::BTreeSet;

@@ -1,10 +1,9 @@
 //! The player node: publishes the motor commands and the measured states of a real flight.
 
 use crate::flight_log::{ColumnMap, FlightLog, Gap, Row};
-use component::OutputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::{MeasuredState, MotorCommand, Quaternion};
-use component::{Component, Info, StepError};
+use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 use inputs::{FileKind, InputFiles};
 use serde::Deserialize;

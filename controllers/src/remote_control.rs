@@ -9,8 +9,7 @@ use crate::angle::wrap_rad;
 use crate::pulses::check_pulse;
 use component::context::{NodeContext, StepContext};
 use component::messages::{RC_CHANNELS_MAX, RcChannels, SetPoint, StateEstimate};
-use component::{Bounded, InputPorts, OutputPorts};
-use component::{Component, Info, StepError};
+use component::{Bounded, Component, Info, InputPorts, OutputPorts, StepError};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, require, within};
 use nalgebra::{Quaternion, UnitQuaternion};
 

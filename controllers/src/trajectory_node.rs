@@ -1,11 +1,10 @@
 //! The trajectory node: publishes the points of a trajectory, with the derivatives that controllers feed forward.
 
 use crate::trajectory::{Point, Start, Trajectory};
-use component::OutputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::{Orientation, PlannedPath, Pose, Reference, Time};
 use component::ports::OutputNumber;
-use component::{Component, Info, StepError};
+use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::ParameterError;
 
 /// Parameters of the trajectory.

@@ -148,8 +148,8 @@ mod tests {
     /// y = 2 x, where x is measured with as much noise as it has signal: least squares finds 1, instruments find 2.
     #[test]
     fn instruments_find_the_slope_of_a_noisy_regressor() {
-        let mut random = bus::random::stream(3, "instruments");
-        let mut normal = || bus::random::normal(&mut random);
+        let mut random = component::random::stream(3, "instruments");
+        let mut normal = || component::random::normal(&mut random);
         let (mut by_instruments, mut by_squares) = (Moments::zero(1), Moments::zero(1));
         for _ in 0..20_000 {
             let (truth, noise, of_result) = (normal(), normal(), normal());

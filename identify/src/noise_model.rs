@@ -141,10 +141,10 @@ mod tests {
     use crate::statistics::autocorrelation;
 
     fn second_order(count: usize) -> Vec<f64> {
-        let mut random = bus::random::stream(5, "noise");
+        let mut random = component::random::stream(5, "noise");
         let mut course = vec![0.0; 2];
         for at in 2..count {
-            course.push(1.5 * course[at - 1] - 0.7 * course[at - 2] + bus::random::normal(&mut random));
+            course.push(1.5 * course[at - 1] - 0.7 * course[at - 2] + component::random::normal(&mut random));
         }
         course
     }
@@ -165,8 +165,8 @@ mod tests {
 
     #[test]
     fn white_noise_stays_as_it_is() {
-        let mut random = bus::random::stream(6, "noise");
-        let course: Vec<f64> = (0..5000).map(|_| bus::random::normal(&mut random)).collect();
+        let mut random = component::random::stream(6, "noise");
+        let course: Vec<f64> = (0..5000).map(|_| component::random::normal(&mut random)).collect();
         let mut products = Products::default();
         products.add(&course);
         let mut whitened = course.clone();

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use bus::announcement::Announcement;
-use bus::messages::SetPoint;
-use bus::{Harness, Message};
+use component::announcement::Announcement;
+use component::messages::SetPoint;
+use component::{Harness, Message};
 use identify::rotor::{self, Found, RotorError};
 use plant::propeller_stand::{PropellerStand, RotorLoad};
 use recorder::writer::RecordingWriter;

@@ -29,12 +29,12 @@ impl Draws {
     }
 
     fn normal(&mut self) -> f64 {
-        bus::random::normal(&mut self.0)
+        component::random::normal(&mut self.0)
     }
 
     /// From 0 to 1.
     fn uniform(&mut self) -> f64 {
-        bus::random::uniform(&mut self.0)
+        component::random::uniform(&mut self.0)
     }
 }
 

@@ -44,7 +44,7 @@ impl Draws {
     }
 
     fn normal(&mut self) -> f64 {
-        bus::random::normal(&mut self.0)
+        component::random::normal(&mut self.0)
     }
 }
 

@@ -21,7 +21,7 @@ const LAGS: usize = 25;
 /// Noise that remembers: x_t = memory x_{t-1} + e_t.
 fn remembering(samples: usize, memory: f64, seed: u64) -> Vec<f64> {
     let mut draws = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || bus::random::normal(&mut draws);
+    let mut normal = || component::random::normal(&mut draws);
     let mut state = normal() / (1.0 - memory * memory).sqrt();
     (0..samples)
         .map(|_| {

@@ -11,12 +11,11 @@ use crate::others::OthersError;
 use crate::output::{Outputs, actuators};
 use crate::parameters::{Parameters, unequal};
 use crate::state::RigidBody;
-use component::InputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::{
     self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame,
 };
-use component::{Component, Info, StepError};
+use component::{Component, Info, InputPorts, StepError};
 use diagnostics::ParameterError;
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -8,7 +8,7 @@ use component::messages::{
     Actuators, Battery, BodyStates, BodyTransform, Contact, FrameName, Odometry, Orientation, PlantState,
     Point, Pose, PoseStamped, Quaternion,
 };
-use bus::ports::OutputNumber;
+use component::ports::OutputNumber;
 use nalgebra::{UnitQuaternion, Vector3};
 use vehicles::CommandMap;
 

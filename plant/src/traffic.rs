@@ -1,11 +1,10 @@
 //! The traffic: gathers where the vehicles of a run are into one sample, for those that share a room.
 
 use crate::backend::TRAFFIC_MAX;
-use component::OutputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::{PlantState, Traffic as Gathered};
 use component::ports::Many;
-use component::{Component, Info, StepError};
+use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 
 /// Gathers the states of the plants of a run.

@@ -1,10 +1,9 @@
 //! A plant that loads the state of another one amid a flight continues byte for byte, with either backend.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use component::Harness;
-use component::State;
 use component::context::NodeContext;
 use component::messages::{MotorCommand, PlantState, Traffic};
+use component::{Harness, State};
 use plant::node::{Inputs, Plant};
 use serde_json::{Value, json};
 

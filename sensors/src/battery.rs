@@ -8,10 +8,9 @@
 use crate::channel::Chance;
 use crate::sensing::Sensor;
 use crate::steps::in_steps;
-use component::Info;
-use component::InputPorts;
 use component::messages::Battery;
 use component::random::normal;
+use component::{Info, InputPorts};
 use diagnostics::parameter::{ParameterError, finite, not_negative, positive, within};
 use inputs::InputFiles;
 

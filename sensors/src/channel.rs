@@ -11,11 +11,10 @@
 //! average. They are drawn from a stream of their own: switching them on does not reshuffle the noise.
 
 use crate::noise::LazyStream;
-use component::Message;
 use component::context::{NodeContext, SampleTimes};
 use component::random::{Stream, stream, uniform};
 use component::sample_ticks::SampleTicks;
-use component::{State, StateError, Transfer};
+use component::{Message, State, StateError, Transfer};
 use diagnostics::digits;
 use diagnostics::parameter::{ParameterError, not_negative, positive, refuse, require};
 

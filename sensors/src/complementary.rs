@@ -22,11 +22,9 @@
 
 use crate::imu_model::ImuReading;
 use crate::wire::{attitude, attitude_message, vector, vector_message};
-use component::Parameters as _;
 use component::context::{NodeContext, StepContext};
 use component::messages::{AttitudeEstimate, Imu, Quaternion, Vector3 as VectorMessage};
-use component::{Component, Info, StepError};
-use component::{InputPorts, Message, OutputPorts};
+use component::{Component, Info, InputPorts, Message, OutputPorts, Parameters as _, StepError};
 use diagnostics::parameter::{ParameterError, not_negative, positive, within};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};

@@ -13,8 +13,7 @@ use component::context::{NodeContext, SampleTimes, StepContext};
 use component::messages::{
     AttitudeEstimate, Barometer, Gps, Imu, Innovation, Magnetometer, Mocap, StateEstimate, Vector3,
 };
-use component::{Component, Info, StepError};
-use component::{InputPorts, OutputPorts};
+use component::{Component, Info, InputPorts, OutputPorts, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 use filter::{Ekf, EkfState};
 use history::{Measurement, Reading, Source};

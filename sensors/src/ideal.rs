@@ -6,10 +6,9 @@
 //! had a part in holds for no vehicle.
 
 use crate::sensing::TruthInputs;
-use component::OutputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::StateEstimate;
-use component::{Component, Info, StepError};
+use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::ParameterError;
 
 /// Parameters of the estimator: none.

@@ -13,8 +13,7 @@ use crate::wire::{vector, vector_message};
 use component::context::{NodeContext, StepContext};
 use component::messages::{FrameName, Imu, PlantState, ROTORS_MAX, StandardImu, Vector3};
 use component::random::Stream;
-use component::{Component, Info, StepError};
-use component::{Message, OutputPorts};
+use component::{Component, Info, Message, OutputPorts, StepError};
 use diagnostics::ParameterError;
 use diagnostics::unit::STANDARD_GRAVITY_M_S2;
 

@@ -6,10 +6,9 @@
 //! is free, is sent without a break, and arrives behind those that were sent before it. The fate of the n-th message
 //! that is sent depends on the seed, the node's name and n alone.
 
-use component::Message;
-use component::StateError;
 use component::ports::FORWARDED_BYTES_MAX;
 use component::random::{self, Stream, uniform};
+use component::{Message, StateError};
 
 /// Streams that share a line at most.
 pub const STREAMS: usize = 16;

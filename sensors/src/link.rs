@@ -19,8 +19,7 @@ use component::ports::{
 };
 use component::random::stream;
 use component::schema::Extent;
-use component::{BusError, Message};
-use component::{Component, Info, State, StateError, StepError, Transfer};
+use component::{BusError, Component, Info, Message, State, StateError, StepError, Transfer};
 use diagnostics::parameter::{positive_up_to, refuse, require, within};
 use diagnostics::{ParameterError, digits};
 use std::collections::BTreeMap;

@@ -5,10 +5,9 @@ pub mod filter;
 mod gains;
 pub mod params;
 
-use component::OutputPorts;
 use component::context::{NodeContext, StepContext};
 use component::messages::{StateEstimate, WallEstimate};
-use component::{Component, Info, StepError};
+use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::ParameterError;
 use filter::{RangeInertial, RangeInertialInputs, RangeInertialState};
 use params::RangeInertialParams;

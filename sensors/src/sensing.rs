@@ -6,8 +6,7 @@ use component::context::{NodeContext, StepContext};
 use component::messages::{Barometer, Battery, Gps, Magnetometer, Mocap, PlantState, Ranges, RotorSpeeds};
 use component::ports::{InputPorts, OutputPorts};
 use component::sample_ticks::SampleTicks;
-use component::{Component, Info, StepError};
-use component::{InputPorts, Message};
+use component::{Component, Info, InputPorts, Message, StepError};
 use diagnostics::ParameterError;
 use inputs::InputFiles;
 

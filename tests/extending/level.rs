@@ -5,15 +5,15 @@ use crate::allocation::RotorWrench;
 use crate::control::{ControlOutput, HoverMotion};
 use crate::law::{Law, LawContext, Predecessor};
 use crate::law_inputs::SetPointInputs;
-use bus::component::Info;
-use bus::messages::Time;
+use component::Info;
+use component::messages::Time;
 use diagnostics::ParameterError;
 use diagnostics::parameter::positive;
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 
 /// Parameters of the law.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Vehicle file, relative to the manifest.
     #[parameter(file = vehicles::FILE)]
@@ -31,7 +31,7 @@ pub struct LevelLaw {
 }
 
 /// It remembers nothing; a state has a field all the same.
-#[derive(Debug, Clone, Copy, Default, bus::Message)]
+#[derive(Debug, Clone, Copy, Default, component::Message)]
 #[repr(C)]
 #[message(type_name = "hummingbus_msgs/msg/LevelState")]
 pub struct LevelState {

@@ -1,22 +1,22 @@
 //! The walk-throughs of docs/extending.md: its files are compiled as they stand there, put into tables, and used.
 //!
-//! A file of a walk-through names its neighbours as it does in its folder. The names `bus` and `crate::…` lead to this
+//! A file of a walk-through names its neighbours as it does in its folder. The names `component` and `crate::…` lead to this
 //! crate, which passes on what the crates have, and the new file beside it.
 #![allow(non_snake_case, reason = "as in the crates whose files these are: _B names a frame, _N the newton")]
 
-// The new message stands among the messages of `bus`, so `bus` is this crate with the messages and one more.
-extern crate bus as real_bus;
-extern crate self as bus;
+// The new message stands among the messages of `component`, so `component` is this crate with the messages and one more.
+extern crate component as real_component;
+extern crate self as component;
 #[macro_use]
 extern crate plant;
 
 pub use plant::rotor;
-pub use real_bus::*;
+pub use real_component::*;
 pub mod messages {
     //! The messages, and that of the walk-through.
     mod climb;
     pub use climb::Climb;
-    pub use real_bus::messages::*;
+    pub use real_component::messages::*;
 }
 
 pub use controllers::{airframe, allocation, control, law, law_inputs};

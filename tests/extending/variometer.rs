@@ -1,15 +1,14 @@
 //! The variometer: the rate of climb, behind a lag, with white noise.
 
-use bus::component::{Component, Info, StepError};
-use bus::context::{NodeContext, StepContext};
-use bus::messages::{Climb, PlantState};
-use bus::random::{self, Stream, normal, stream};
-use bus::{InputPorts, Message, OutputPorts};
+use component::context::{NodeContext, StepContext};
+use component::messages::{Climb, PlantState};
+use component::random::{self, Stream, normal, stream};
+use component::{Component, Info, InputPorts, Message, OutputPorts, StepError};
 use diagnostics::ParameterError;
 use diagnostics::parameter::{not_negative, positive};
 
 /// Parameters of the variometer. Tuned, no source.
-#[derive(Debug, bus::Parameters)]
+#[derive(Debug, component::Parameters)]
 pub struct Parameters {
     /// Time constant of the lag.
     #[parameter(check = positive)]

@@ -4,10 +4,11 @@ use crate::support::repository;
 use std::path::Path;
 
 /// The sources that hold tests.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     "tests/faults",
     "tests/runs",
     "bus/src",
+    "bus/component/src",
     "bus/tests",
     "recorder/tests",
     "flights/tests",

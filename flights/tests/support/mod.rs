@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use bus::Message;
-use bus::messages::{Imu, MotorCommand, Time};
+use component::Message;
+use component::messages::{Imu, MotorCommand, Time};
 use flights::{Flight, FlightSet, FlightsError};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use tempfile::TempDir;

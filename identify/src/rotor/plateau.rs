@@ -197,8 +197,8 @@ mod tests {
 
     #[test]
     fn the_median_of_readings_that_remember_is_less_certain() {
-        let mut random = bus::random::stream(1, "stand");
-        let fresh: Vec<f64> = (0..400).map(|_| bus::random::normal(&mut random)).collect();
+        let mut random = component::random::stream(1, "stand");
+        let fresh: Vec<f64> = (0..400).map(|_| component::random::normal(&mut random)).collect();
         // That of the median of 400 normal numbers is 1.253 / 20.
         assert!((median_error(&fresh) / 0.0627 - 1.0).abs() < 0.15, "{}", median_error(&fresh));
         let held: Vec<f64> = fresh.iter().flat_map(|value| [*value; 4]).collect();

@@ -3,7 +3,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
 use super::{Sensors, Sticks, empty, padded, push, stirred_by};
-use bus::random::Stream;
+use component::random::Stream;
 use controllers::allocation::Allocation;
 use flights::{Flight, FlightSet, Role};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -218,12 +218,12 @@ impl Log {
         let mut flight = empty();
         flight.name = format!("bearing {}", bearing.seed);
         flight.rotors = declared.rotors.len();
-        let random = bus::random::stream(bearing.seed, "sensors of a bearing");
+        let random = component::random::stream(bearing.seed, "sensors of a bearing");
         Self { flight, random, gravity_m_s2: declared.gravity_m_s2 }
     }
 
     fn noisy(&mut self, value: Vector3<f64>, deviation: f64) -> [f64; 3] {
-        value.map(|value| value + deviation * bus::random::normal(&mut self.random)).into()
+        value.map(|value| value + deviation * component::random::normal(&mut self.random)).into()
     }
 
     fn sample(&mut self, bearing: &Bearing, tick: usize, body: &Body, commands: &PerRotor<f64>) {
@@ -249,7 +249,8 @@ impl Log {
             }
         }
         if sensors.has_rotor_speeds {
-            let speeds = body.speeds_rad_s.map(|speed| speed + noise * bus::random::normal(&mut self.random));
+            let speeds =
+                body.speeds_rad_s.map(|speed| speed + noise * component::random::normal(&mut self.random));
             push(&mut self.flight.rotor_speed, time_s, padded(&speeds));
         }
     }

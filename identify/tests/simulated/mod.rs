@@ -3,7 +3,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-use bus::random::Stream;
+use component::random::Stream;
 use controllers::allocation::{Allocation, RotorWrench};
 use flights::{Channel, Flight, Role};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -116,9 +116,9 @@ struct Course {
 impl Course {
     fn of(plan: &Plan) -> Self {
         let height_m = plan.height_m;
-        let mut random = bus::random::stream(plan.seed, "course");
+        let mut random = component::random::stream(plan.seed, "course");
         let mut uniform = move || {
-            let normal = bus::random::normal(&mut random);
+            let normal = component::random::normal(&mut random);
             0.5 + normal.clamp(-2.0, 2.0) / 4.0
         };
         // Near the ground it stays clear of it.
@@ -227,8 +227,8 @@ impl Sticks {
 
     /// Kicks `size` times as large as usual.
     fn of_seed(seed: u64, duration_s: f64, size: f64) -> Self {
-        let mut random = bus::random::stream(seed, "sticks");
-        let mut normal = move || bus::random::normal(&mut random);
+        let mut random = component::random::stream(seed, "sticks");
+        let mut normal = move || component::random::normal(&mut random);
         let count = (duration_s / STICK_S) as usize + 1;
         let one = |_| ([0.03, 0.03, 0.015].map(|torque| size * torque * normal()), 0.1 * normal());
         Self((0..count).map(one).collect())
@@ -345,13 +345,13 @@ struct Log {
 
 impl Log {
     fn new(plan: &Plan) -> Self {
-        let random = bus::random::stream(plan.seed, "sensors");
+        let random = component::random::stream(plan.seed, "sensors");
         Self { random, sensors: plan.sensors, is_on_rig: plan.is_on_rig, flight: empty() }
     }
 
     fn noisy(&mut self, value: [f64; 3], deviation: f64) -> [f64; 3] {
         value.map(|value| {
-            let normal = bus::random::normal(&mut self.random);
+            let normal = component::random::normal(&mut self.random);
             value + self.sensors.noise * deviation * normal
         })
     }
@@ -386,7 +386,7 @@ impl Log {
         }
         if self.sensors.has_rotor_speeds {
             let speeds = plant.state().rotors.map(|rotor| {
-                let normal = bus::random::normal(&mut self.random);
+                let normal = component::random::normal(&mut self.random);
                 rotor.speed_rad_s + self.sensors.noise * normal
             });
             push(&mut self.flight.rotor_speed, time_s, padded(&speeds));

@@ -22,9 +22,7 @@ use super::params::EkfParams;
 use super::start::{lost_covariance, start};
 use super::transition::{Covariance, CovarianceView, STATES, Transition};
 use crate::wire::attitude;
-use component::Message;
-use component::Parameters as _;
-use component::{State, StateError, Transfer};
+use component::{Message, Parameters as _, State, StateError, Transfer};
 use diagnostics::parameter::{ParameterError, positive, require};
 use nalgebra::{SMatrix, Vector3};
 

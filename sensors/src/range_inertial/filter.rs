@@ -23,11 +23,10 @@ use super::axis::{AHEAD, Axis, Echo, PATH, Side, VELOCITY};
 use super::gains::{Gains, TooLongAgo};
 use super::params::RangeInertialParams;
 use crate::wire::{attitude, vector, vector_message};
-use component::Parameters as _;
 use component::messages::{
     AttitudeEstimate, Gps, Imu, Quaternion, Ranges, StateEstimate, Vector3 as Vector3Message, WallEstimate,
 };
-use component::{InputPorts, Message};
+use component::{InputPorts, Message, Parameters as _};
 use diagnostics::parameter::{ParameterError, positive};
 use nalgebra::{UnitQuaternion, Vector3};
 

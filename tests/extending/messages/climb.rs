@@ -1,7 +1,7 @@
 //! Rate at which a vehicle rises.
 
 use super::Time;
-use bus::Message;
+use component::Message;
 
 /// Reading of a variometer.
 #[derive(Clone, Copy, Debug, Default, Message)]
