@@ -63,7 +63,7 @@ impl Brief {
 fn answer(report: &Report) -> String {
     let count = report.verdict.len();
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
-    let [small, beyond] = [false, true].map(|at_bound| report.withdrawn_names(at_bound));
+    let (small, beyond) = (report.small_names(), report.withdrawn_names(true));
     if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
     } else if !report.losses.is_empty() && count == 0 && report.prediction_only.is_empty() {

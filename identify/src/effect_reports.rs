@@ -214,6 +214,7 @@ mod tests {
             rounds: Vec::new(),
             withdrawn: Vec::new(),
             worths: BTreeMap::new(),
+            without_worth: BTreeMap::new(),
         };
         assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));
         assert_eq!(far_by_equations(&selection(Some(0.3)), 0), None, "seven standard errors");

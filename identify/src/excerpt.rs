@@ -97,6 +97,7 @@ pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Sel
         (found.accepted, found.after) =
             without_effects(problem, &found.accepted, &found.after, &[stopped.effect]);
         found.worths.remove(stopped.effect);
+        found.without_worth.remove(stopped.effect);
         found.withdrawn.push(stopped);
     }
 }

@@ -35,6 +35,8 @@ pub struct Report {
     /// Accepted effects that predictions need, with values by the equations and by predictions that contradict each other. The vehicle file has
     /// them. They are not properties of the vehicle.
     pub prediction_only: Vec<&'static str>,
+    /// Accepted errors of sensors that change no prediction noticeably, each with the reason. They are fitted, and not named.
+    pub without_worth: BTreeMap<&'static str, String>,
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
     pub losses: Vec<Loss>,
@@ -229,9 +231,9 @@ fn clock_in_words(offset: Offset) -> String {
 }
 
 impl Report {
-    /// The effects of the verdict, and those that are kept for predictions.
+    /// The effects of the verdict, and those that are fitted and not named.
     fn accepted(&self) -> impl Iterator<Item = &&'static str> {
-        self.verdict.iter().chain(&self.prediction_only)
+        self.verdict.iter().chain(&self.prediction_only).chain(self.without_worth.keys())
     }
 
     /// True if no effect was accepted and the validation data are too short for one.
@@ -338,9 +340,15 @@ impl Report {
         withdrawn.map(|withdrawn| withdrawn.effect).collect()
     }
 
+    /// The effects that change no prediction noticeably: withdrawn, or fitted and not named.
+    pub(crate) fn small_names(&self) -> Vec<&'static str> {
+        self.withdrawn_names(false).into_iter().chain(self.without_worth.keys().copied()).collect()
+    }
+
     /// The reason why no effect is named.
     fn no_effect(&self) -> String {
-        let [effects, beyond] = [false, true].map(|at_bound| self.withdrawn_names(at_bound).join(", "));
+        let [effects, beyond] =
+            [self.small_names(), self.withdrawn_names(true)].map(|names| names.join(", "));
         if !effects.is_empty() {
             format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
         } else if !beyond.is_empty() {
@@ -373,6 +381,9 @@ impl Report {
         if self.losses.is_empty() && !self.prediction_only.is_empty() {
             let names = self.prediction_only.join(", ");
             writeln!(f, "kept for predictions only, not a property of the vehicle: {names}")?;
+        }
+        for (effect, reason) in &self.without_worth {
+            writeln!(f, "fitted and not named: {effect}: {reason}")?;
         }
         if let Some(bearing) = self.bearing {
             let is_lost = self.is_undecided() || !self.losses.is_empty();
@@ -619,6 +630,7 @@ impl Report {
             flights: Vec::new(),
             verdict: Vec::new(),
             prediction_only: Vec::new(),
+            without_worth: BTreeMap::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),
@@ -719,6 +731,23 @@ mod tests {
         let text = report.to_string();
         let refined = "held-out data, by the equations before the refinement: 1.053 without it, 3.227 with";
         assert!(text.contains(refined), "{text}");
+    }
+
+    #[test]
+    fn an_error_of_a_sensor_without_worth_stands_below_the_verdict() {
+        let reason = "no prediction error falls noticeably with it";
+        let mut report = Report {
+            without_worth: BTreeMap::from([("sensor-bias", reason.to_owned())]),
+            effects: BTreeMap::from([("sensor-bias", effect()), ("parasitic-drag", effect())]),
+            ..Report::of_nothing()
+        };
+        let text = report.to_string();
+        let nothing = "verdict: nothing. The equations fit better with sensor-bias, but no prediction error falls noticeably.\n\
+                       fitted and not named: sensor-bias: no prediction error falls noticeably with it\n  sensor-bias: normalised residual";
+        assert!(text.contains(nothing), "{text}");
+        report.verdict.push("parasitic-drag");
+        let text = report.to_string();
+        assert!(text.contains("verdict: parasitic-drag\nfitted and not named: sensor-bias: "), "{text}");
     }
 
     #[test]

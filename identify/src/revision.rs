@@ -14,7 +14,7 @@ use crate::foresight::Foresight;
 use crate::judgement::{FALSE_RATE, Judged, Way, at_bound, fitted, joint_p_value};
 use crate::logging;
 use crate::refine::{Refined, refined};
-use crate::sensor_effects::SENSOR_EFFECTS;
+use crate::sensor_effects::{ATTITUDE_BIAS, SENSOR_EFFECTS};
 use crate::simpler::{Exchange, exchanges};
 use crate::worth::Worth;
 use plant::effects::{Action, EffectKind};
@@ -80,6 +80,8 @@ pub struct End {
     pub refined: Option<FitResult>,
     /// Prediction errors of the judged flights with and without each accepted effect.
     pub worths: BTreeMap<&'static str, Vec<Worth>>,
+    /// Accepted errors of sensors that change no prediction noticeably, each with the reason.
+    pub without_worth: BTreeMap<&'static str, String>,
 }
 
 /// Revisions of one search, which know each other.
@@ -117,14 +119,13 @@ impl Revisions {
         let Some(moved) = refined(problem, base, self.near.as_deref()) else {
             progress("every effect once more, by predictions");
             let predictions = search.predictions();
-            let end = End { refined: None, worths: predictions.worths() };
             let together = |dropped: &[usize]| search.foresight(dropped);
             let found = search.unworthy(&predictions, together);
             if !found.is_empty() {
                 return Revision::Without(found);
             }
             let exchange = search.simpler(&predictions.with, given_up, &self.added, None);
-            return exchange.unwrap_or(Revision::Done(end));
+            return exchange.unwrap_or_else(|| Revision::Done(search.end(None, &predictions)));
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
@@ -143,7 +144,7 @@ impl Revisions {
         progress("further effects, by predictions");
         match self.asked_for(&search, &moved, &predictions.with, open) {
             Some(found) => Revision::With(Box::new(found)),
-            None => Revision::Done(End { refined: Some(moved.result), worths: predictions.worths() }),
+            None => Revision::Done(search.end(Some(moved.result), &predictions)),
         }
     }
 
@@ -354,6 +355,24 @@ impl Found<'_, '_> {
         Foresight::of(problem, &problem.equations(&base.values, &base.free), base, dropped)
     }
 
+    /// The end of a search with these `predictions`.
+    fn end(&self, refined: Option<FitResult>, predictions: &Predictions) -> End {
+        End { refined, worths: predictions.worths(), without_worth: self.without_worth(predictions) }
+    }
+
+    /// Accepted errors of sensors that change no prediction noticeably, each with the reason. They stay in the fit: without the rotation of a sensor, the
+    /// equations would explain its mean forces by another effect.
+    fn without_worth(&self, predictions: &Predictions) -> BTreeMap<&'static str, String> {
+        let idle = predictions.idle(|name| self.is_of_attitude(name));
+        idle.into_iter().map(|Withdrawn { effect, reason, .. }| (effect, reason)).collect()
+    }
+
+    /// True if an effect is the rotation of the attitude's sensor alone. It shows by the direction of forces, and so in predictions. Biases of gyroscope
+    /// and accelerometer show against another sensor: predictions do not judge them.
+    fn is_of_attitude(&self, name: &str) -> bool {
+        self.of_effect(name).iter().all(|candidate| *candidate.kind == ATTITUDE_BIAS)
+    }
+
     /// Errors of sensors may be great and yet change no prediction, and what stands for the logging of the commands is no effect.
     fn may_be_idle(&self, name: &str) -> bool {
         self.of_effect(name).iter().all(|candidate| {
@@ -446,8 +465,36 @@ pub fn without_effects(
 mod tests {
     use super::*;
     use crate::run::problem;
+    use crate::sensor_effects::ACCELEROMETER_BIAS;
     use crate::simulated::effect;
     use crate::test_flights::{candidate, simulated, with_light_rotors};
+
+    /// The rotation of the attitude's sensor stands below the verdict where predictions do as well without it, a bias of the accelerometer in the verdict.
+    #[test]
+    fn the_rotation_of_a_sensor_that_changes_no_prediction_has_no_worth() {
+        let vehicle = with_light_rotors();
+        let set = simulated(&vehicle, &[]);
+        let (problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let base = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        let of_kind = |kind: &'static EffectKind| {
+            let all = &problem.model.parameters.all;
+            Candidate { kind, free: (0..all.len()).filter(|at| all[*at].kind == kind).collect() }
+        };
+        let [attitude, accelerometer] = [&ATTITUDE_BIAS, &ACCELEROMETER_BIAS].map(of_kind);
+        // Errors without the bias, in units of those with it.
+        let without_worth = |accepted: &[Candidate], times: f64| {
+            let found = Found { problem: &problem, accepted, base: &base };
+            let with = unrefined_foresight(&problem, &base);
+            let without = vec![(ATTITUDE_BIAS.name, unrefined_foresight(&problem, &base).times(times))];
+            found.without_worth(&Predictions { with, without })
+        };
+        let alone = std::slice::from_ref(&attitude);
+        let found = without_worth(alone, 1.0);
+        let reason = found.get("sensor-bias").expect("the same errors without it");
+        assert!(reason.starts_with("no prediction error falls noticeably with it"), "{reason}");
+        assert!(without_worth(alone, 2.0).is_empty(), "twice as large without it");
+        assert!(without_worth(&[attitude.clone(), accelerometer], 1.0).is_empty());
+    }
 
     /// The equations allow the exchange. Predictions with half the errors do not.
     #[test]

@@ -146,11 +146,14 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let is_contradictory =
         |name: &&'static str| effects.get(name).is_some_and(EffectReport::is_contradictory);
     let accepted = effect_reports::accepted(&problem, &selection);
-    let (prediction_only, verdict) = accepted.into_iter().partition(is_contradictory);
+    let without_worth = selection.without_worth.clone();
+    let named = accepted.into_iter().filter(|name| !without_worth.contains_key(name));
+    let (prediction_only, verdict) = named.partition(is_contradictory);
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         verdict,
         prediction_only,
+        without_worth,
         losses,
         bearing: bearing(&problem),
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),

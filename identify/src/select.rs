@@ -86,6 +86,8 @@ pub struct Selection {
     pub withdrawn: Vec<Withdrawn>,
     /// Prediction errors of the judged flights with and without each accepted effect.
     pub worths: BTreeMap<&'static str, Vec<Worth>>,
+    /// Accepted errors of sensors that change no prediction noticeably, each with the reason.
+    pub without_worth: BTreeMap<&'static str, String>,
 }
 
 impl Selection {
@@ -163,7 +165,7 @@ impl StepwiseSearch {
         let mut open = candidates.to_vec();
         let mut withdrawn = Vec::new();
         let mut revisions = Revisions::default();
-        let End { refined, worths } = loop {
+        let End { refined, worths, without_worth } = loop {
             self.run(problem, &open, revisions.added(), progress);
             problem.weigh(&self.base, candidates);
             let fitted = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
@@ -192,7 +194,7 @@ impl StepwiseSearch {
         };
         let Self { accepted, rounds, base: after } = self;
         let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
-        Selection { accepted, before, after, refined, rounds, withdrawn, worths }
+        Selection { accepted, before, after, refined, rounds, withdrawn, worths, without_worth }
     }
 
     /// The `open` candidates that rounds took and that are no longer accepted.

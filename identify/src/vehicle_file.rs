@@ -186,6 +186,7 @@ mod tests {
             flights: Vec::new(),
             verdict: Vec::new(),
             prediction_only: Vec::new(),
+            without_worth: BTreeMap::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),

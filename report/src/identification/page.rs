@@ -244,6 +244,7 @@ mod tests {
             flights: FLIGHTS.map(flight).to_vec(),
             verdict: Vec::new(),
             prediction_only: Vec::new(),
+            without_worth: BTreeMap::new(),
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),
