@@ -474,13 +474,16 @@ mod tests {
     fn the_rotation_of_a_sensor_that_changes_no_prediction_has_no_worth() {
         let vehicle = with_light_rotors();
         let set = simulated(&vehicle, &[]);
-        let (problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
-        let base = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
         let of_kind = |kind: &'static EffectKind| {
             let all = &problem.model.parameters.all;
             Candidate { kind, free: (0..all.len()).filter(|at| all[*at].kind == kind).collect() }
         };
         let [attitude, accelerometer] = [&ATTITUDE_BIAS, &ACCELEROMETER_BIAS].map(of_kind);
+        let alone = std::slice::from_ref(&attitude);
+        let declared = problem.fitted(&problem.model.parameters.baseline(), &[]);
+        problem.weigh(&declared, alone);
+        let base = problem.fitted(&declared.values, &attitude.free);
         // Errors without the bias, in units of those with it.
         let without_worth = |accepted: &[Candidate], times: f64| {
             let found = Found { problem: &problem, accepted, base: &base };
@@ -488,7 +491,6 @@ mod tests {
             let without = vec![(ATTITUDE_BIAS.name, unrefined_foresight(&problem, &base).times(times))];
             found.without_worth(&Predictions { with, without })
         };
-        let alone = std::slice::from_ref(&attitude);
         let found = without_worth(alone, 1.0);
         let reason = found.get("sensor-bias").expect("the same errors without it");
         assert!(reason.starts_with("no prediction error falls noticeably with it"), "{reason}");
