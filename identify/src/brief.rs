@@ -36,14 +36,15 @@ impl Brief {
     pub fn of(report: &Report) -> Self {
         let named = |name: &&'static str| Some((*name, report.effects.get(name)?));
         let accepted: Vec<_> = report.verdict.iter().filter_map(named).collect();
-        let findings = if report.losses.is_empty() { accepted.as_slice() } else { &[] };
+        let is_judged = report.losses.is_empty() && !report.stopped;
+        let findings = if is_judged { accepted.as_slice() } else { &[] };
         Self {
             answer: answer(report),
-            // Effects of a model that loses are no findings.
+            // Effects of a model that loses, or of a search that was stopped, are no findings.
             missing: findings
                 .iter()
                 .map(|(name, effect)| missing(name, effect))
-                .chain(winds(report).filter(|_| report.losses.is_empty()))
+                .chain(winds(report).filter(|_| is_judged))
                 .collect(),
             certainty: findings
                 .iter()
@@ -64,7 +65,9 @@ fn answer(report: &Report) -> String {
     let count = report.verdict.len();
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
     let (small, beyond) = (report.small_names(), report.withdrawn_names(true));
-    if report.is_undecided() {
+    if report.stopped {
+        "The search was stopped before its end: there is no answer yet.".to_owned()
+    } else if report.is_undecided() {
         "These flights are too short to tell.".to_owned()
     } else if !report.losses.is_empty() && count == 0 && report.prediction_only.is_empty() {
         "The declared vehicle file does not describe these flights: simpler predictions are better."
@@ -169,6 +172,10 @@ fn judged_in(report: &Report) -> Option<String> {
 
 fn next(report: &Report, accepted: &[(&str, &EffectReport)]) -> Vec<String> {
     let mut steps = Vec::new();
+    if report.stopped {
+        steps.push("Run the command again, and let it end.".to_owned());
+        return steps;
+    }
     if report.is_undecided() {
         steps.push(format!(
             "Fly longer: the flights to choose effects on have {} blocks of {} s, and a dozen are needed.",
@@ -300,6 +307,14 @@ mod tests {
             ]),
             ..Report::of_nothing()
         }
+    }
+
+    #[test]
+    fn a_search_that_was_stopped_has_no_answer() {
+        let brief = Brief::of(&Report { stopped: true, ..report() });
+        assert_eq!(brief.answer, "The search was stopped before its end: there is no answer yet.");
+        assert_eq!(brief.next, ["Run the command again, and let it end."]);
+        assert!(brief.missing.is_empty() && brief.certainty.is_empty(), "{brief:?}");
     }
 
     #[test]

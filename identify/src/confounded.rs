@@ -21,8 +21,11 @@ pub struct Rival {
     pub fitted: FitResult,
 }
 
-/// The rivals of each accepted candidate among `open` ones.
+/// The rivals of each accepted candidate among `open` ones; none after a search that was stopped, which has named nothing for sure.
 pub fn rivals(problem: &Problem, selection: &Selection, open: &[Candidate]) -> Vec<Vec<Rival>> {
+    if selection.is_stopped {
+        return vec![Vec::new(); selection.accepted.len()];
+    }
     (0..selection.accepted.len()).map(|at| of_candidate(problem, selection, open, at)).collect()
 }
 

@@ -215,6 +215,7 @@ mod tests {
             withdrawn: Vec::new(),
             worths: BTreeMap::new(),
             without_worth: BTreeMap::new(),
+            is_stopped: false,
         };
         assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));
         assert_eq!(far_by_equations(&selection(Some(0.3)), 0), None, "seven standard errors");

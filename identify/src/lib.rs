@@ -35,7 +35,7 @@
 //! | `regressor` | what residuals are looked at against |
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
 //! | [`effect_reports`], [`worth`] | each effect as it was judged, and what predictions gain by it |
-//! | [`report`], [`brief`], [`vehicle_file`] | what is written down |
+//! | [`report`], `flight_report`, [`brief`], [`vehicle_file`] | what is written down |
 //! | `digits` | numbers in texts for people |
 //! | [`rotor`] | rotors and motors from a thrust stand or from flights |
 //!
@@ -70,6 +70,7 @@ mod excerpt;
 mod faults;
 mod fit;
 mod fit_result;
+mod flight_report;
 mod flight_wind;
 mod forecast;
 mod foresight;

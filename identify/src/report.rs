@@ -20,6 +20,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use vehicles::bearing::Bearing;
 
+pub use crate::flight_report::FlightReport;
 pub use crate::horizons::{Change, Changes};
 pub use crate::noise::Noise;
 
@@ -37,6 +38,8 @@ pub struct Report {
     pub prediction_only: Vec<&'static str>,
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason. They are fitted, and not named.
     pub without_worth: BTreeMap<&'static str, String>,
+    /// True if the search was stopped before its end: effects may be missing, and predictions have judged none of those that are named.
+    pub stopped: bool,
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
     /// describe these flights, with these effects or without.
     pub losses: Vec<Loss>,
@@ -93,25 +96,6 @@ pub struct BeforeAfter<T> {
     pub before: T,
     /// With the accepted effects.
     pub after: T,
-}
-
-/// A flight as it was used.
-#[derive(Debug, Clone, Serialize)]
-pub struct FlightReport {
-    /// Its name.
-    pub name: String,
-    /// `fit`, `select` or `test`.
-    pub role: Role,
-    /// Length of the compared part, in s.
-    pub compared_s: f64,
-    /// Width of the windows in which measurement and model are compared, in s.
-    pub window_s: f64,
-    /// The equations that its channels allow.
-    pub equations: Vec<&'static str>,
-    /// Assumptions in place of measurements.
-    pub assumed: Vec<String>,
-    /// Notes of the reader.
-    pub notes: Vec<String>,
 }
 
 /// An effect as it came out.
@@ -253,13 +237,15 @@ impl Report {
 
     /// True if the test flights tell where the model holds. A model that loses was not validated anywhere.
     pub(crate) fn has_validated(&self) -> bool {
-        self.losses.is_empty() && !self.envelope.is_empty()
+        self.losses.is_empty() && !self.stopped && !self.envelope.is_empty()
     }
 
     /// Limit on the use of the new vehicle file, in words; `None` if there is none.
     #[must_use]
     pub fn limited_use(&self) -> Option<String> {
-        if self.is_undecided() {
+        if self.stopped {
+            Some("not to be used: the search was stopped before its end".to_owned())
+        } else if self.is_undecided() {
             None
         } else if !self.losses.is_empty() {
             Some("not to be used: it does not describe these flights".to_owned())
@@ -359,7 +345,14 @@ impl Report {
     }
 
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_undecided() {
+        if self.stopped {
+            let found: Vec<&str> = self.verdict.iter().chain(&self.prediction_only).copied().collect();
+            let found = if found.is_empty() { "nothing".to_owned() } else { found.join(", ") };
+            writeln!(
+                f,
+                "\nverdict: undecided. The search was stopped before its end: effects may be missing or wrong. Found so far: {found}"
+            )?;
+        } else if self.is_undecided() {
             let (blocks, block_s) = (self.validation_blocks, self.block_s);
             writeln!(
                 f,
@@ -631,6 +624,7 @@ impl Report {
             verdict: Vec::new(),
             prediction_only: Vec::new(),
             without_worth: BTreeMap::new(),
+            stopped: false,
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),
@@ -748,6 +742,17 @@ mod tests {
         report.verdict.push("parasitic-drag");
         let text = report.to_string();
         assert!(text.contains("verdict: parasitic-drag\nfitted and not named: sensor-bias: "), "{text}");
+    }
+
+    #[test]
+    fn a_search_that_was_stopped_gives_no_verdict() {
+        let effects = BTreeMap::from([("parasitic-drag", effect())]);
+        let verdict = vec!["parasitic-drag"];
+        let report = Report { verdict, effects, stopped: true, ..Report::of_nothing() };
+        let text = report.to_string();
+        assert!(text.contains("verdict: undecided. The search was stopped before its end"), "{text}");
+        assert!(text.contains("Found so far: parasitic-drag\n"), "{text}");
+        assert!(report.limited_use().is_some_and(|use_| use_.starts_with("not to be used")));
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub enum Revision {
 }
 
 /// The end of a search.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct End {
     /// The refined fit, where that predicts better.
     pub refined: Option<FitResult>,
@@ -82,6 +82,8 @@ pub struct End {
     pub worths: BTreeMap<&'static str, Vec<Worth>>,
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason.
     pub without_worth: BTreeMap<&'static str, String>,
+    /// True if the search was stopped before: then nothing was refined or judged by predictions.
+    pub is_stopped: bool,
 }
 
 /// Revisions of one search, which know each other.
@@ -357,7 +359,8 @@ impl Found<'_, '_> {
 
     /// The end of a search with these `predictions`.
     fn end(&self, refined: Option<FitResult>, predictions: &Predictions) -> End {
-        End { refined, worths: predictions.worths(), without_worth: self.without_worth(predictions) }
+        let (worths, without_worth) = (predictions.worths(), self.without_worth(predictions));
+        End { refined, worths, without_worth, is_stopped: false }
     }
 
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason. They stay in the fit: without the rotation of a sensor, the

@@ -96,6 +96,19 @@ pub struct Picture {
 /// # Errors
 /// If the vehicle file cannot be read, or no flight of a role can be used.
 pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outcome, IdentifyError> {
+    identify_until(set, progress, &|| false)
+}
+
+/// The same. The search ends early if `is_stopped` is true between two of its rounds: the report then has what was found so far, and
+/// [`Report::stopped`] is true.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_until(
+    set: &FlightSet,
+    progress: &mut dyn FnMut(&str),
+    is_stopped: &dyn Fn() -> bool,
+) -> Result<Outcome, IdentifyError> {
     let vehicle = Vehicle::load_from(&set.files, &set.vehicle)?;
     let declared = entry::resolve(&vehicle.effects)?;
     progress("preparing flights");
@@ -107,7 +120,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
     let mut excerpt = excerpt(&problem);
     let searched = excerpt.as_mut().unwrap_or(&mut problem);
-    let mut selection = select(searched, &open, progress);
+    let mut selection = select(searched, &open, progress, is_stopped);
     progress("confounded effects");
     let mut effects = effect_reports::judged(searched, &selection);
     let mut rivals = rivals(searched, &selection, &open);
@@ -154,6 +167,7 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         verdict,
         prediction_only,
         without_worth,
+        stopped: selection.is_stopped,
         losses,
         bearing: bearing(&problem),
         limits: limits(&of_measured_attitude(&problem, &held_out), &noise_floor),
@@ -186,7 +200,8 @@ pub fn identify(set: &FlightSet, progress: &mut dyn FnMut(&str)) -> Result<Outco
         problem.flights().map(|flight| (name(flight), regressors(&problem.model, flight, values))).collect();
     let pictures = pictures(&problem, &selection);
     // A model that loses is not worth another flight of its effects, and nobody knows the wind of another flight.
-    let is_found = report.losses.is_empty() && !report.verdict.is_empty() && report.winds.is_empty();
+    let is_judged = report.losses.is_empty() && !report.stopped;
+    let is_found = is_judged && !report.verdict.is_empty() && report.winds.is_empty();
     let questions = OpenQuestions::of(&problem, &selection, &rivals).filter(|_| is_found);
     drop(problem);
     Ok(Outcome { pictures, regressors, effects, late, sensor_errors, report, believed, questions })

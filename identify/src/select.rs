@@ -88,6 +88,8 @@ pub struct Selection {
     pub worths: BTreeMap<&'static str, Vec<Worth>>,
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason.
     pub without_worth: BTreeMap<&'static str, String>,
+    /// True if the search was stopped before its end.
+    pub is_stopped: bool,
 }
 
 impl Selection {
@@ -106,15 +108,20 @@ impl Selection {
     }
 }
 
-/// Selects among `candidates`, telling `progress` of each step.
+/// Selects among `candidates`, telling `progress` of each step, until it ends or `is_stopped` says so between two rounds.
 ///
 /// In the end effects without which predictions are better are taken back, and the search goes on without them.
-pub fn select(problem: &mut Problem, candidates: &[Candidate], progress: &mut dyn FnMut(&str)) -> Selection {
+pub fn select(
+    problem: &mut Problem,
+    candidates: &[Candidate],
+    progress: &mut dyn FnMut(&str),
+    is_stopped: &dyn Fn() -> bool,
+) -> Selection {
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
     search.begin_in_several_winds(problem, candidates, progress);
-    search.finished(problem, candidates, progress)
+    search.finished(problem, candidates, progress, is_stopped)
 }
 
 /// State of a selection.
@@ -155,21 +162,26 @@ impl StepwiseSearch {
         (self.accepted, self.base) = (accepted, fitted);
     }
 
-    /// The selection among `candidates` after rounds and revisions, until neither changes anything.
+    /// The selection among `candidates` after rounds and revisions, until neither changes anything. A search that is stopped ends without a revision.
     fn finished(
         mut self,
         problem: &mut Problem,
         candidates: &[Candidate],
         progress: &mut dyn FnMut(&str),
+        is_stopped: &dyn Fn() -> bool,
     ) -> Selection {
         let mut open = candidates.to_vec();
         let mut withdrawn = Vec::new();
         let mut revisions = Revisions::default();
-        let End { refined, worths, without_worth } = loop {
-            self.run(problem, &open, revisions.added(), progress);
+        let end = loop {
+            self.run(problem, &open, revisions.added(), progress, is_stopped);
             problem.weigh(&self.base, candidates);
             let fitted = problem.fitted(&self.base.values, &free_parameters(&self.accepted));
             self.base = held_at_limits(problem, fitted);
+            if is_stopped() {
+                progress("stopped: what was found so far is reported");
+                break End { is_stopped: true, ..End::default() };
+            }
             let given_up = self.given_up(&open);
             let Self { accepted, base, rounds } = &mut self;
             match revisions.next(problem, (accepted, base), (&open, &given_up), progress) {
@@ -193,8 +205,9 @@ impl StepwiseSearch {
             }
         };
         let Self { accepted, rounds, base: after } = self;
+        let End { refined, worths, without_worth, is_stopped } = end;
         let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
-        Selection { accepted, before, after, refined, rounds, withdrawn, worths, without_worth }
+        Selection { accepted, before, after, refined, rounds, withdrawn, worths, without_worth, is_stopped }
     }
 
     /// The `open` candidates that rounds took and that are no longer accepted.
@@ -208,15 +221,19 @@ impl StepwiseSearch {
         given_up
     }
 
-    /// Rounds among `candidates` until none changes anything; those `kept` are not given up for others.
+    /// Rounds among `candidates` until none changes anything or the search is stopped; those `kept` are not given up for others.
     fn run(
         &mut self,
         problem: &mut Problem,
         candidates: &[Candidate],
         kept: &[Candidate],
         progress: &mut dyn FnMut(&str),
+        is_stopped: &dyn Fn() -> bool,
     ) {
         for _ in 0..ROUNDS_MAX {
+            if is_stopped() {
+                break;
+            }
             let open = candidates.iter().filter(|candidate| !candidate.is_in(&self.accepted)).count();
             if open == 0 {
                 break;
@@ -560,6 +577,7 @@ mod tests {
     use crate::simulated::effect;
     use crate::test_flights::{candidate, simulated, with_light_rotors};
     use plant::effects::Effect;
+    use std::cell::Cell;
 
     /// The end of a search among mass, thrust and inertia, in which the mass was taken and then given up for the other two.
     fn found(truth: &[Effect]) -> Selection {
@@ -578,7 +596,7 @@ mod tests {
         let base = problem.fitted(&declared.values, &free_parameters(&accepted));
         let rounds = vec![Round { judged: vec![taken], taken: Some(0) }];
         let search = StepwiseSearch { accepted, rounds, base };
-        search.finished(&mut problem, &candidates, &mut |_| ())
+        search.finished(&mut problem, &candidates, &mut |_| (), &|| false)
     }
 
     #[test]
@@ -596,6 +614,31 @@ mod tests {
         assert_eq!(candidates, open);
         let is_promise = |judged: &Judged| judged.way == Way::Promise && !judged.is_accepted;
         assert!(found.iter().all(|judged| is_promise(judged) && judged.gain > 0.0), "{found:?}");
+    }
+
+    /// The search among mass, thrust and inertia of a heavier vehicle, stopped before the round of this number.
+    fn stopped_before(round: usize) -> Selection {
+        let vehicle = with_light_rotors();
+        let set = simulated(&vehicle, &[effect("mass-error", &[("error", 0.2)])]);
+        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let candidates =
+            ["mass-error", "thrust-scale", "inertia-error"].map(|name| candidate(&problem, name));
+        let asked = Cell::new(0);
+        let is_stopped = || {
+            asked.set(asked.get() + 1);
+            asked.get() >= round
+        };
+        select(&mut problem, &candidates, &mut |_| (), &is_stopped)
+    }
+
+    #[test]
+    fn a_search_that_is_stopped_keeps_the_effects_of_its_rounds() {
+        let stopped = stopped_before(2);
+        assert!(stopped.is_stopped && stopped.refined.is_none() && stopped.worths.is_empty(), "{stopped:?}");
+        assert_eq!((stopped.rounds.len(), stopped.accepted.len()), (1, 1), "{stopped:?}");
+        assert!(stopped.after.estimation_cost() < stopped.before.estimation_cost(), "{stopped:?}");
+        let at_once = stopped_before(1);
+        assert!(at_once.is_stopped && at_once.rounds.is_empty() && at_once.accepted.is_empty());
     }
 
     /// More mass turns as the declared vehicle does, and this one turns by a quarter slower.

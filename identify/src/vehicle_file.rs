@@ -42,7 +42,9 @@ pub fn text(
     added["effects"] = Item::ArrayOfTables(tables);
     // A comment holds no control character.
     let file = diagnostics::printable_line(&file);
-    let doubt = if report.losses.is_empty() {
+    let doubt = if report.stopped {
+        "# The search was stopped before its end: effects may be missing or wrong.\n"
+    } else if report.losses.is_empty() {
         ""
     } else {
         "# It does not describe these flights: its predictions lose to persistence or to the declared file (`losses` in report.json).\n"
@@ -187,6 +189,7 @@ mod tests {
             verdict: Vec::new(),
             prediction_only: Vec::new(),
             without_worth: BTreeMap::new(),
+            stopped: false,
             losses: Vec::new(),
             bearing: None,
             withdrawn: Vec::new(),

@@ -43,6 +43,7 @@ const lossText = ({ flight, horizon, channel, rival, other, unit, ...loss }) =>
 
 function verdictText() {
   const isUndecided = !acceptedNames.length && report.validation_blocks < 12;
+  if (report.stopped) return `The search was stopped before its end: effects may be missing or wrong. Found so far: ${acceptedNames.join(", ") || "nothing"}.`;
   if (report.losses.length && !isUndecided) {
     const asked = acceptedNames.length ? ` The equations ask for ${acceptedNames.join(", ")}: not to be acted on.` : "";
     return `This vehicle file does not describe these flights: its predictions lose.${asked}`;
