@@ -1,7 +1,7 @@
 //! The command `identify`: effects that flights show and the declared model lacks, and the model with them.
 
 use super::files::{PAGE, require_kind};
-use super::interrupts::stop_token;
+use super::interrupts::{WithoutRun, stop_token};
 use super::kind;
 use super::next_flight::{self, NextFlight};
 use super::output::{self, print_json, print_text, readable};
@@ -140,7 +140,11 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
         (next_flight::SET_POINTS, &SET_POINTS),
     ];
     let _lock = claim(out, &files, &inputs)?;
-    let mut outcome = identify::run::identify(&set, &mut |step| say(step))?;
+    let stop = stop_token()?;
+    let is_stopped = || stop.count() > 0;
+    let searching = WithoutRun::begin();
+    let mut outcome = identify::run::identify_until(&set, &mut |step| say(step), &is_stopped)?;
+    drop(searching);
     let vehicle = out.join("vehicle.toml");
     let text = vehicle_file::text(&set.files, &set.vehicle, &outcome.effects, &outcome.report)?;
     write(out, "vehicle.toml", &VEHICLE, &text)?;
@@ -153,19 +157,18 @@ fn flights_of(arguments: &IdentifyArguments, file: &Path, out: &Path) -> Result<
     write_page(&outcome, None)?;
     let mut report = serde_json::to_value(&outcome.report)?;
     write_json(out, &report)?;
-    let flown = if arguments.no_bus {
+    let flown = if arguments.no_bus || is_stopped() {
         None
     } else {
-        let stop = stop_token()?;
         let how = Validation { host: Host::this_binary(), ..Validation::new(COMPONENTS, &stop) };
         let mut tell = |line: &str| say(&format!("on the bus: {line}"));
         identification::fly_again(&set, &vehicle, &outcome, &how, &mut tell)?
     };
     remove_proposal(out)?;
-    let questions = outcome.questions.take().filter(|_| !arguments.no_next_flight);
+    let questions = outcome.questions.take().filter(|_| !arguments.no_next_flight && !is_stopped());
     let is_searched = questions.is_some();
     if let Some(questions) = questions {
-        let next = next_flight::propose(&set, &outcome, questions, &vehicle, &stop_token()?, &say)?;
+        let next = next_flight::propose(&set, &outcome, questions, &vehicle, &stop, &say)?;
         write_proposal(out, &next)?;
         outcome.report.next_flight = Some(next.proposal);
         report = serde_json::to_value(&outcome.report)?;
