@@ -25,23 +25,28 @@ impl Worth {
     }
 }
 
-/// The errors after the longest horizon in words, without the effect -> with it; `None` where there are none.
+/// The errors after each horizon in words, without the effect -> with it; `None` where there are none.
 ///
 /// ```
 /// use identify::worth::{Worth, in_words};
 /// let of = |channel, horizon_s, without, with, unit| Worth { channel, horizon_s, without, with, unit };
 /// let worths = [of("velocity", 0.1, 0.11, 0.05, "m/s"), of("velocity", 0.5, 0.48, 0.06, "m/s"), of("attitude", 0.5, 2.1, 2.0, "deg")];
-/// let words = "after 0.5 s: velocity 0.4800 -> 0.06000 m/s, attitude 2.100 -> 2.000 deg";
+/// let words = "after 0.1 s: velocity 0.1100 -> 0.05000 m/s; after 0.5 s: velocity 0.4800 -> 0.06000 m/s, attitude 2.100 -> 2.000 deg";
 /// assert_eq!(in_words(&worths).as_deref(), Some(words));
 /// assert_eq!(in_words(&[]), None);
 /// ```
 #[must_use]
 pub fn in_words(worths: &[Worth]) -> Option<String> {
-    let longest_s = worths.iter().map(|worth| worth.horizon_s).reduce(f64::max)?;
-    let longest = worths.iter().filter(|worth| worth.horizon_s >= longest_s);
+    let mut horizons_s: Vec<f64> = worths.iter().map(|worth| worth.horizon_s).collect();
+    horizons_s.sort_by(f64::total_cmp);
+    horizons_s.dedup();
     let one = |Worth { channel, without, with, unit, .. }: &Worth| {
         format!("{channel} {} -> {} {unit}", rounded(*without), rounded(*with))
     };
-    let errors: Vec<String> = longest.map(one).collect();
-    Some(format!("after {longest_s} s: {}", errors.join(", ")))
+    let of_horizon = |horizon_s: &f64| {
+        let of_all = worths.iter().filter(|worth| worth.horizon_s.total_cmp(horizon_s).is_eq());
+        format!("after {horizon_s} s: {}", of_all.map(one).collect::<Vec<_>>().join(", "))
+    };
+    let words: Vec<String> = horizons_s.iter().map(of_horizon).collect();
+    (!words.is_empty()).then(|| words.join("; "))
 }

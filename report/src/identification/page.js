@@ -138,10 +138,11 @@ function effectRows([name, effect]) {
     const label = long([spaced(parameter), shownUnit(unit) && `[${shownUnit(unit)}]`].join(" "));
     return [left(index ? "" : judged), label, number(value), `${number(low)} to ${number(high)}`, ...(index ? [] : figures)];
   });
-  const longest = Math.max(...effect.worth.map(({ horizon_s }) => horizon_s));
-  const worth = effect.worth.filter(({ horizon_s }) => horizon_s === longest).map(({ channel, without, with: by, unit }) =>
-    `${channel} ${number(without)} → ${number(by)} ${unit}`);
-  if (worth.length) rows.push([left(""), long(`Prediction errors without it → with it, after ${longest} s: ${worth.join(", ")}.`, 8)]);
+  for (const after of [...new Set(effect.worth.map(({ horizon_s }) => horizon_s))].sort((a, b) => a - b)) {
+    const worth = effect.worth.filter(({ horizon_s }) => horizon_s === after).map(({ channel, without, with: by, unit }) =>
+      `${channel} ${number(without)} → ${number(by)} ${unit}`);
+    rows.push([left(""), long(`Prediction errors without it → with it, after ${after} s: ${worth.join(", ")}.`, 8)]);
+  }
   if (effect.experiment) rows.push([left(""), long(`To tell it from ${effect.confused_with[0]}: ${effect.experiment}.`, 8)]);
   return grouped(name, rows).map(({ cells, className }) => ({ cells, className: effect.accepted ? className : `${className} left-out` }));
 }
