@@ -29,6 +29,8 @@ COUNTS = 1000
 UP = np.array([0.0, 0.0, 1.0])
 AXES = "xyz"
 ROTORPY, MUJOCO = "rotorpy", "mujoco"
+# A vehicle that leans more, or is farther from its start, is out of control.
+LEAN_MAX_DEG, AWAY_M = 80.0, 60.0
 CONTROLLERS = ["pd", "geometric", "cascade", "sticks"]
 COURSES = ["sines", "eight", "steps"]
 SINES, EIGHT, STEPS = COURSES
@@ -609,6 +611,14 @@ def scaled_power(vehicle, speeds):
     return float((vehicle.torque * np.abs(speeds) ** 3).sum())
 
 
+def is_lost(state):
+    """True if the vehicle has tipped over or flown away. One that follows its course by metres late, with slow gains, is under control."""
+    if not np.isfinite(state).all():
+        return True
+    x, y = state[6:8]
+    return 1 - 2 * (x * x + y * y) < np.cos(np.radians(LEAN_MAX_DEG)) or np.linalg.norm(state[:3]) > AWAY_M
+
+
 def fly(truth, declared, simulator, controller, disturbance, seen_noise, command_ticks, is_quantised):
     """Flies a controller through a simulator; arrays by tick."""
     count = len(disturbance)
@@ -621,7 +631,7 @@ def fly(truth, declared, simulator, controller, disturbance, seen_noise, command
             "nominal_voltage": NOMINAL_V, "capacity": 3000.0, "efficiency": 0.7}
     for tick in range(count):
         state = flight.state()
-        if np.linalg.norm(state[:3] - controller.course(tick * TICK_S)[0]) > 8 or not np.isfinite(state).all():
+        if is_lost(state):
             raise Lost
         if tick % command_ticks == 0:
             speeds = controller.command(tick * TICK_S, seen(state, seen_noise[tick]), command_ticks * TICK_S)
@@ -850,13 +860,17 @@ def kind_of_controller(draw, setting):
     return setting.get("controller") or str(draw.choice(CONTROLLERS))
 
 
+# Flights of a set that are drawn for one setting, and settings that are drawn for one seed.
+ATTEMPTS, DRAWS = 5, 3
+
+
 def make_set(folder, setting, vehicle):
-    """Flies a set; where one of its flights is lost, all of it again with another seed, five times at most."""
+    """Flies a set; where one of its flights is lost, all of it again with other random numbers. False if all attempts are lost."""
     os.makedirs(folder, exist_ok=True)
     truth = truth_of(vehicle, setting["effects"])
     names = [("fit-1", "fit"), ("fit-2", "fit"), ("test-1", "test")] + [("test-2", "test")] * (setting["seed"] % 3 == 0)
-    for attempt in range(5):
-        draw = np.random.default_rng([setting["seed"], attempt, 1])
+    for attempt in range(ATTEMPTS):
+        draw = np.random.default_rng([setting["seed"], ATTEMPTS * setting["redrawn"] + attempt, 1])
         try:
             flown = [fly_one(draw, setting, truth, vehicle, kind_of_controller(draw, setting)) for _ in names]
             break
@@ -876,9 +890,10 @@ def make_set(folder, setting, vehicle):
     return True
 
 
-def draw_set(seed, simulator, names=None, quiet=None, values=None):
-    """What is flown for a seed: the setting, and the vehicle that is declared. `names` replaces the effects drawn."""
-    draw = np.random.default_rng([seed, 0])
+def draw_set(seed, simulator, names=None, quiet=None, values=None, redrawn=0):
+    """What is flown for a seed: the setting, and the vehicle that is declared. `names` replaces the effects drawn. `redrawn` is the number of settings of
+    this seed that got out of control."""
+    draw = np.random.default_rng([seed, 0, redrawn, 2] if redrawn else [seed, 0])
     vehicle = draw_vehicle(draw, simulator)
     if names is None:
         effects = draw_effects(draw, simulator, vehicle)
@@ -889,7 +904,7 @@ def draw_set(seed, simulator, names=None, quiet=None, values=None):
     if set(effects) & {"com-offset", "weak-rotor"}:
         # A constant torque of its own in each flight would hide them, as identify says.
         conditions["trim_rad_s2"] = 0.0
-    return {"seed": seed, "truth": simulator, "effects": effects, "conditions": conditions}, vehicle
+    return {"seed": seed, "truth": simulator, "effects": effects, "conditions": conditions, "redrawn": redrawn}, vehicle
 
 
 # Feedback and inertia: a controller answers disturbances, so that torques and rates are correlated beyond the dynamics.
@@ -906,12 +921,12 @@ def feedback_case(index):
     return own % len(SPECTRA), own // len(SPECTRA) % len(FEEDBACK_CONTROLLERS), own // (len(SPECTRA) * len(FEEDBACK_CONTROLLERS))
 
 
-def draw_feedback_set(seed, simulator, index):
+def draw_feedback_set(seed, simulator, index, redrawn=0):
     """Little noise, no other disturbance, and one inertia error about all axes."""
     spectrum, controller, error = feedback_case(index)
     names = ["inertia-error"] if INERTIA_ERRORS[error] else []
     values = {"inertia-error": {f"error_{axis}{axis}": INERTIA_ERRORS[error] for axis in AXES}}
-    setting, vehicle = draw_set(seed, simulator, names, values=values)
+    setting, vehicle = draw_set(seed, simulator, names, values=values, redrawn=redrawn)
     (torque, time_s), was = SPECTRA[spectrum], setting["conditions"]
     setting["conditions"] |= {
         "torque_rad_s2": torque, "torque_s": time_s, "force_m_s2": 0.02, "force_s": 0.5, "trim_rad_s2": 0.0, "coloured_part": 0.3,
@@ -944,17 +959,23 @@ def arguments():
     return given
 
 
+def drawn(given, redrawn):
+    """The setting and the declared vehicle of the seed, after so many that got out of control."""
+    if given.feedback is not None:
+        setting, vehicle = draw_feedback_set(given.seed, given.truth, given.feedback, redrawn)
+    else:
+        setting, vehicle = draw_set(given.seed, given.truth, given.names, given.quiet, redrawn=redrawn)
+    return setting | ({"controller": given.controller} if given.controller else {}), vehicle
+
+
 def main():
     given = arguments()
-    if given.feedback is not None:
-        setting, vehicle = draw_feedback_set(given.seed, given.truth, given.feedback)
-    else:
-        setting, vehicle = draw_set(given.seed, given.truth, given.names, given.quiet)
-    if given.controller:
-        setting["controller"] = given.controller
-    if not make_set(given.folder, setting, vehicle):
-        write(os.path.join(given.folder, "lost.json"), json.dumps(setting) + "\n")
-        sys.exit(f"{given.folder}: five attempts got out of control")
+    for redrawn in range(DRAWS):
+        setting, vehicle = drawn(given, redrawn)
+        if make_set(given.folder, setting, vehicle):
+            return
+    write(os.path.join(given.folder, "lost.json"), json.dumps(setting) + "\n")
+    sys.exit(f"{given.folder}: {ATTEMPTS} attempts of each of {DRAWS} settings got out of control")
 
 
 if __name__ == "__main__":
