@@ -235,9 +235,9 @@ impl Report {
             .all(|(name, horizons)| is_assumed(name) || horizons.values().all(BTreeMap::is_empty))
     }
 
-    /// True if the test flights tell where the model holds. A model that loses was not validated anywhere.
+    /// True if the test flights tell where the model holds. A model that loses, or that no prediction judged, was not validated anywhere.
     pub(crate) fn has_validated(&self) -> bool {
-        self.losses.is_empty() && !self.stopped && !self.envelope.is_empty()
+        self.losses.is_empty() && !self.stopped && !self.is_unchecked() && !self.envelope.is_empty()
     }
 
     /// Limit on the use of the new vehicle file, in words; `None` if there is none.
@@ -513,7 +513,7 @@ impl Report {
     }
 
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.held_out.is_empty() {
+        if self.held_out.values().any(|horizons| !horizons.is_empty()) {
             let what = "prediction errors on the test flights (RMS, declared -> new; in brackets with the flight's own trim, with the disturbance \
                         seen before, and persistence)";
             writeln!(f, "\n{what}:")?;
@@ -521,7 +521,7 @@ impl Report {
                 writeln!(f, "  (last in brackets: in the wind of the flight seen before)")?;
             }
         }
-        for (flight, horizons) in &self.held_out {
+        for (flight, horizons) in self.held_out.iter().filter(|(_, horizons)| !horizons.is_empty()) {
             writeln!(f, "  {flight}")?;
             for (horizon, channels) in horizons {
                 let one = |(name, change): (&&str, &Change)| {
