@@ -132,7 +132,7 @@ impl<'a> Layout<'a> {
         let is_plausible = !is_in_rad || largest <= std::f64::consts::TAU;
         is_plausible.then_some(()).ok_or_else(|| {
             let found = format!("up to {largest:.1}, more than a turn");
-            let advice = "`unit = \"deg\"` would fit; correct it, or set `trust_units = true`";
+            let advice = "write `unit = \"deg\"`, which would fit, or set `trust_units = true`";
             LogError::unexpected(Spot::Whole, "roll and pitch in rad", found, advice)
         })
     }
@@ -162,7 +162,7 @@ impl<'a> Layout<'a> {
         };
         turned.try_into().map_err(|row: Vec<f64>| {
             let (expected, found) = (format!("{N} numbers in a sample"), row.len().to_string());
-            LogError::unexpected(Spot::Whole, expected, found, "correct the names in `channels`")
+            LogError::unexpected(Spot::Whole, expected, found, "give a name for each number in `channels`")
         })
     }
 }
@@ -200,7 +200,7 @@ fn named(quantity: Quantity, entry: &Entry, rotors: usize) -> Result<(Cow<'_, [N
         names => {
             let expected =
                 if size > 1 { format!("{size} names, or that of an array") } else { "1 name".to_owned() };
-            return refused(key, &expected, &names.len().to_string(), "correct it");
+            return refused(key, &expected, &names.len().to_string(), "give a name for each number");
         }
     };
     Ok((names, shape))
@@ -222,7 +222,12 @@ fn holds(quantity: Quantity, entry: &Entry) -> Result<Holds, LogError> {
     }
     let quoted = |holds: &Holds| format!("\"{}\"", holds.name());
     let expected = known.iter().map(quoted).collect::<Vec<_>>().join(" or ");
-    Err(LogError::unexpected(Spot::Key("holds"), expected, quoted(&holds), "correct it"))
+    Err(LogError::unexpected(
+        Spot::Key("holds"),
+        expected,
+        quoted(&holds),
+        "write one of these, or leave it out",
+    ))
 }
 
 /// Refuses `on_change` of all but commands: other channels have a value between their samples.
@@ -240,7 +245,10 @@ fn pole_pairs(quantity: Quantity, entry: &Entry) -> Result<f64, LogError> {
         Some(_) if quantity != Quantity::RotorSpeed => {
             Err(LogError::unexpected(at, "this key in `rotor_speed` alone", "it here", "remove it"))
         }
-        Some(0) => Err(LogError::unexpected(at, "half the number of a motor's magnets", "0", "correct it")),
+        Some(0) => {
+            let advice = "count the magnets, or leave it out where the log has mechanical speeds";
+            Err(LogError::unexpected(at, "half the number of a motor's magnets", "0", advice))
+        }
         pairs => Ok(f64::from(pairs.unwrap_or(1))),
     }
 }
@@ -248,6 +256,7 @@ fn pole_pairs(quantity: Quantity, entry: &Entry) -> Result<f64, LogError> {
 fn factor(dimension: Dimension, unit: Option<&str>) -> Result<f64, LogError> {
     unit.and_then(|unit| dimension.factor(unit)).ok_or_else(|| {
         let found = unit.map_or("none".to_owned(), |unit| format!("\"{unit}\""));
-        LogError::unexpected(Spot::Key("unit"), dimension.names(" or "), found, "correct it")
+        let advice = "write one of these; `scale` and `offset` convert numbers of other units";
+        LogError::unexpected(Spot::Key("unit"), dimension.names(" or "), found, advice)
     })
 }

@@ -1,10 +1,11 @@
 //! Errors of a flights file, or of a log that it names.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Display as _};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use diagnostics::{Diagnostic, Place};
+use diagnostics::{Diagnostic, Place, suggestion};
 use vehicles::table::TableError;
 
 use crate::finding::Finding;
@@ -36,7 +37,7 @@ pub enum FlightsError {
         cause: Box<Diagnostic>,
     },
     /// A log cannot be read, or does not have the channels that the flights file asks for.
-    #[error("{place}: flight `{flight}`, log {}: {}{cause}", file.display(), named(*channel))]
+    #[error(fmt = of_log)]
     Log {
         /// The line of the flights file that asks.
         place: Place,
@@ -120,14 +121,65 @@ fn vehicle(place: &Place, cause: &Diagnostic, f: &mut fmt::Formatter<'_>) -> fmt
     cause.fmt(f)
 }
 
-/// As [`vehicle`].
+/// With `{:#}` the line of the flights file stands below the fault, and the advice below the line.
+fn of_log(
+    place: &Place,
+    flight: &str,
+    file: &Path,
+    channel: &Option<Quantity>,
+    cause: &LogError,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    write!(f, "{place}: flight `{flight}`, log {}: {}", file.display(), named(*channel))?;
+    cause.fmt(f)?;
+    if !f.alternate() {
+        return Ok(());
+    }
+    write!(f, "\n{place:#}")?;
+    match cause.advice() {
+        advice if advice.is_empty() => Ok(()),
+        advice => write!(f, "\n  help: {advice}"),
+    }
+}
+
+/// As [`vehicle`]. With `{:#}` a fault of a line that several flights meet is shown once.
 fn several(all: &[FlightsError], _: &Option<Box<Diagnostic>>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    all.iter().enumerate().try_for_each(|(index, error)| {
+    // Whoever prints it has written the word before the first.
+    let (between, once) = match f.alternate() {
+        true => ("\nerror: ", once_each(all)),
+        false => ("\n", all.iter().map(|error| (error, Vec::new())).collect()),
+    };
+    for (index, (error, others)) in once.iter().enumerate() {
         if index > 0 {
-            writeln!(f)?;
+            f.write_str(between)?;
         }
-        error.fmt(f)
-    })
+        error.fmt(f)?;
+        match &others[..] {
+            [] => {}
+            [other] => write!(f, "\n  also in flight `{other}`")?,
+            _ => write!(f, "\n  also in {} other flights", others.len())?,
+        }
+    }
+    Ok(())
+}
+
+/// Each error once, with the other flights that meet the same fault at the same line of the flights file.
+fn once_each(all: &[FlightsError]) -> Vec<(&FlightsError, Vec<&str>)> {
+    let mut once: Vec<(&FlightsError, Vec<&str>)> = Vec::new();
+    let mut known = BTreeMap::new();
+    for error in all {
+        let FlightsError::Log { place, flight, channel, cause, .. } = error else {
+            once.push((error, Vec::new()));
+            continue;
+        };
+        let next = once.len();
+        let index = *known.entry(format!("{place}: {}{cause}", named(*channel))).or_insert(next);
+        match once.get_mut(index) {
+            Some((_, others)) => others.push(flight.as_str()),
+            None => once.push((error, Vec::new())),
+        }
+    }
+    once
 }
 
 impl From<FlightsError> for diagnostics::Error {
@@ -182,7 +234,7 @@ impl FlightsError {
     }
 }
 
-/// Fault of a log, or of a request to it.
+/// Fault of a log, or of a request to it. Its text ends with advice, except with `{:#}`: [`LogError::advice`] returns it.
 ///
 /// ```
 /// use flights::{LogError, Spot};
@@ -190,11 +242,13 @@ impl FlightsError {
 /// let (expected, found) = ("a whole header".to_owned(), "one that is cut".to_owned());
 /// let error = LogError::Unexpected { at: Spot::Byte(7), expected, found, advice: "copy it again" };
 /// assert_eq!(error.to_string(), "byte 7: expected a whole header, found one that is cut; copy it again");
+/// assert_eq!(format!("{error:#}"), "byte 7: expected a whole header, found one that is cut");
+/// assert_eq!(error.advice(), "copy it again");
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read at all.
-    #[error("cannot read it: {cause}; {advice}")]
+    #[error(fmt = unreadable)]
     Unreadable {
         /// The error of the system.
         #[source]
@@ -206,7 +260,7 @@ pub enum LogError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// It has no column, topic or field of a name.
-    #[error("no {kind} `{name}`; it has {}; correct {key}", shortened(known))]
+    #[error(fmt = missing)]
     Missing {
         /// Kind of the item that was searched: a column, a topic.
         kind: &'static str,
@@ -218,7 +272,7 @@ pub enum LogError {
         key: &'static str,
     },
     /// Something else than expected.
-    #[error("{at}expected {expected}, found {found}; {advice}")]
+    #[error(fmt = unexpected)]
     Unexpected {
         /// Place in the log or in its entry.
         at: Spot,
@@ -233,7 +287,7 @@ pub enum LogError {
     #[error(transparent)]
     Sparse(#[from] Sparse),
     /// A part of a log in several files is wrong.
-    #[error("part {}: {cause}", file.display())]
+    #[error(fmt = part)]
     Part {
         /// The file of the part.
         file: PathBuf,
@@ -294,6 +348,66 @@ impl LogError {
         let known = known.into_iter().map(|name| name.to_string()).collect();
         Self::Missing { kind, name: name.to_owned(), known, key }
     }
+
+    /// Returns advice; empty where the text says what to do.
+    #[must_use]
+    pub fn advice(&self) -> String {
+        match self {
+            Self::Unreadable { advice, .. } => advice.clone(),
+            Self::Missing { name, known, key, .. } => choose(name, known, key),
+            Self::Unexpected { expected, found, advice, .. } => {
+                meant(expected, found).unwrap_or_else(|| (*advice).to_owned())
+            }
+            Self::Part { cause, .. } => cause.advice(),
+            Self::Table(_) | Self::Sparse(_) => String::new(),
+        }
+    }
+}
+
+fn unreadable(cause: &io::Error, advice: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "cannot read it: {cause}")?;
+    write_advice(advice, f)
+}
+
+fn missing(kind: &str, name: &str, known: &[String], key: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "no {kind} `{name}`; it has {}", shortened(known))?;
+    write_advice(&choose(name, known, key), f)
+}
+
+fn unexpected(
+    at: &Spot,
+    expected: &str,
+    found: &str,
+    advice: &str,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    write!(f, "{at}expected {expected}, found {found}")?;
+    write_advice(&meant(expected, found).unwrap_or_else(|| advice.to_owned()), f)
+}
+
+fn part(file: &Path, cause: &LogError, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "part {}: ", file.display())?;
+    cause.fmt(f)
+}
+
+/// Writes the advice behind a fault; with `{:#}` whoever prints the fault shows it elsewhere.
+fn write_advice(advice: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    if f.alternate() { Ok(()) } else { write!(f, "; {advice}") }
+}
+
+/// Advice on the name `name`, which is none of `known`, in the key `key`.
+fn choose(name: &str, known: &[String], key: &str) -> String {
+    // Another element of the same array is no other spelling.
+    let array = |name: &str| name.split_once('[').map(|(array, _)| array.to_owned());
+    let others = known.iter().filter(|other| array(name).is_none() || array(other) != array(name));
+    suggestion(name, others.map(String::as_str)).unwrap_or_else(|| format!("choose {key} from this list"))
+}
+
+/// The question for the word that was probably meant, if `expected` is a choice of words in quotes.
+fn meant(expected: &str, found: &str) -> Option<String> {
+    let word = |text: &str| Some(text.strip_prefix('"')?.strip_suffix('"')?.to_owned());
+    let words: Vec<String> = expected.split(" or ").map(word).collect::<Option<_>>()?;
+    suggestion(&word(found)?, words.iter().map(String::as_str))
 }
 
 /// The names there are; shortened where they are many.
@@ -339,6 +453,68 @@ mod tests {
             assert_eq!((error.with_causes(), format!("{error:#}")), (text, text_with_lines));
         }
         assert_eq!(no_rows().diagnostic(), None);
+    }
+
+    fn of_log(flight: &str, cause: LogError) -> FlightsError {
+        let text = "[channels]\ncommand = { unit = \"counts\" }\n";
+        let place = Place::of("flights.toml", text, &(21..40));
+        let (flight, file) = (flight.to_owned(), PathBuf::from(format!("{flight}.csv")));
+        FlightsError::Log { place, flight, file, channel: Some(Quantity::Command), cause }
+    }
+
+    fn unit(found: &str) -> LogError {
+        let advice = "write one of these units";
+        LogError::unexpected(Spot::Key("unit"), "\"count\" or \"%\"", format!("\"{found}\""), advice)
+    }
+
+    #[test]
+    fn the_line_of_the_flights_file_is_shown_before_the_advice() {
+        let error = of_log("a", unit("volt"));
+        let message = "flights.toml:2:11: flight `a`, log a.csv: `command`: `unit`: expected \"count\" or \"%\", \
+                       found \"volt\"";
+        assert_eq!(error.to_string(), format!("{message}; write one of these units"));
+        let shown = format!("{error:#}");
+        assert!(shown.starts_with(&format!("{message}\n  |\n2 | command = ")), "{shown}");
+        assert!(shown.ends_with("\n  help: write one of these units"), "{shown}");
+        // No cause is repeated behind it.
+        let chain = causes(&error);
+        assert!(chain.iter().all(|cause| diagnostics::has_text_of(&shown, *cause)), "{shown}");
+    }
+
+    fn causes(error: &FlightsError) -> Vec<&(dyn std::error::Error + 'static)> {
+        std::iter::successors(std::error::Error::source(error), |cause| cause.source()).collect()
+    }
+
+    #[test]
+    fn a_name_that_is_nearly_right_is_asked_for() {
+        assert_eq!(unit("counts").advice(), "did you mean `count`?");
+        let topics = ["/imu/imu", "/mocap/mocap"];
+        let topic = LogError::missing("topic", "/mocap/mocp", topics, "`topic`");
+        assert_eq!(topic.advice(), "did you mean `/mocap/mocap`?");
+        assert!(topic.to_string().ends_with("it has /imu/imu, /mocap/mocap; did you mean `/mocap/mocap`?"));
+        let element = LogError::missing("field", "command[9]", ["command[0]", "command[1]"], "`fields`");
+        assert_eq!(element.advice(), "choose `fields` from this list");
+        let parquet = LogError::unexpected(Spot::Whole, "\"us\" or no unit", "\"s\"", "leave it out");
+        assert_eq!(parquet.advice(), "leave it out");
+    }
+
+    #[test]
+    fn a_fault_of_a_line_that_several_flights_meet_is_shown_once() {
+        fn all(names: &[&str]) -> Vec<FlightsError> {
+            names.iter().map(|name| of_log(name, unit("volt"))).collect()
+        }
+        let two = FlightsError::gather(all(&["a", "b"])).unwrap_err();
+        assert_eq!(two.to_string().lines().count(), 2);
+        let shown = format!("{two:#}");
+        assert_eq!(shown.matches("command = ").count(), 1, "{shown}");
+        assert!(shown.ends_with("\n  also in flight `b`"), "{shown}");
+        let mut more = all(&["a", "b", "c"]);
+        more.push(of_log("d", unit("V")));
+        let shown = format!("{:#}", FlightsError::gather(more).unwrap_err());
+        assert!(
+            shown.contains("\n  also in 2 other flights\nerror: flights.toml:2:11: flight `d`"),
+            "{shown}"
+        );
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl ParquetLog {
                     Spot::Key("time.unit"),
                     expected,
                     found,
-                    "correct or remove it",
+                    "leave it out: the file states the unit",
                 ));
             }
             (_, unit) => rows::time_factor(unit, ", as the type of the column says none")?,

@@ -383,7 +383,7 @@ impl Reading<'_> {
             |(quantity, time_s): &(Quantity, &[f64])| time_s.is_empty() && self.declared(*quantity).is_some();
         let lost = flight.times().into_iter().filter(is_lost).map(|(quantity, _)| {
             let expected = format!("samples in the flight's part from {} s on", self.start_s());
-            let (found, advice) = ("no sample lies there", "correct `from_s` and `to_s`");
+            let (found, advice) = ("none", "set `from_s` and `to_s` to times of the log");
             self.channel_error(quantity, LogError::unexpected(Spot::Whole, expected, found, advice))
         });
         FlightsError::gather(lost.collect())

@@ -38,7 +38,8 @@ pub fn time_factor(unit: Option<&str>, others: &str) -> Result<f64, LogError> {
     let (dimension, unit) = (Quantity::Time.dimension(), unit.unwrap_or("(none)"));
     dimension.factor(unit).ok_or_else(|| {
         let expected = format!("{}{others}", dimension.names(" or "));
-        LogError::unexpected(Spot::Key("time.unit"), expected, unit, "correct it")
+        let advice = "write one of these; `scale` converts times of another unit";
+        LogError::unexpected(Spot::Key("time.unit"), expected, unit, advice)
     })
 }
 
@@ -84,7 +85,8 @@ pub fn recording(time_s: &[f64], form: &Form<'_>, places: &Places<'_>) -> Result
         (Some(number), _) if number.get() <= count => Ok(bounds(number.get() - 1)),
         (Some(number), _) => {
             let found = format!("{number} of {count}");
-            Err(LogError::unexpected(Spot::Key("recording"), "a recording of the file", found, "correct it"))
+            let advice = "recordings are counted from 1: name one that the file has";
+            Err(LogError::unexpected(Spot::Key("recording"), "a recording of the file", found, advice))
         }
         (None, Some(first)) => {
             let before_s =

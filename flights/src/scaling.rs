@@ -16,12 +16,9 @@ pub fn each(
         Some(EachNumber::Each(numbers)) if numbers.len() == count => numbers.clone(),
         Some(EachNumber::Each(numbers)) => {
             let expected = format!("a number, or a list of {count}");
-            return Err(LogError::unexpected(
-                key,
-                expected,
-                format!("a list of {}", numbers.len()),
-                "correct it",
-            ));
+            let found = format!("a list of {}", numbers.len());
+            let advice = "give one for all, or one for each number of a sample";
+            return Err(LogError::unexpected(key, expected, found, advice));
         }
     };
     // A scale of 0 makes a channel that does not move.
@@ -30,7 +27,8 @@ pub fn each(
         None => Ok(numbers),
         Some(number) => {
             let expected = if default == 0.0 { "finite numbers" } else { "finite numbers other than 0" };
-            Err(LogError::unexpected(key, expected, number.to_string(), "correct it"))
+            let advice = "leave it out where the unit alone converts the numbers";
+            Err(LogError::unexpected(key, expected, number.to_string(), advice))
         }
     }
 }

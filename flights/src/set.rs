@@ -150,7 +150,8 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
         let (entry, key) = (entry.get_ref(), |name: &str| format!("flight.{index}.{name}"));
         if let Some((bound, at, found)) = bad_window(entry) {
             let expected = "0 <= from_s < to_s, in seconds from the log's first sample";
-            errors.push(document.bad(&at, key(bound), expected, found, "correct it"));
+            let advice = "leave both out for the whole log";
+            errors.push(document.bad(&at, key(bound), expected, found, advice));
         }
         if let Some(recording) = entry.recording.filter(|_| entry.file.get_ref().are_parts()) {
             let (expected, found) =
@@ -163,7 +164,8 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
             if *quantity == Quantity::Time || !number.is_finite() {
                 let expected = "a finite number of seconds for a channel other than time";
                 let key = key(&format!("delay_s.{quantity}"));
-                errors.push(document.bad(&delay_s.span(), key, expected, number, "correct it"));
+                let advice = "state the delay of a channel against the log's time";
+                errors.push(document.bad(&delay_s.span(), key, expected, number, advice));
             }
         }
     }
@@ -174,7 +176,8 @@ fn check_keys(document: &Document, flights: &[Spanned<FlightEntry>]) -> Vec<Flig
 fn check_limits(document: &Document, declaration: &Declaration) -> Option<FlightsError> {
     let limits = declaration.next_flight.as_ref()?;
     let (key, expected, found) = limits.get_ref().refusal()?;
-    Some(document.bad(&limits.span(), format!("next_flight.{key}"), expected, found, "correct it"))
+    let advice = "leave it out for the limit that the flights reach";
+    Some(document.bad(&limits.span(), format!("next_flight.{key}"), expected, found, advice))
 }
 
 /// Names that several flights have, or that are more than a part of a line.
@@ -188,7 +191,7 @@ fn check_names(document: &Document, logs: &[Log<'_>]) -> Vec<FlightsError> {
             log,
             expected,
             format!("\"{found}\""),
-            "correct the name; where it is the log's, rename the log",
+            "give the flight a `name`, or rename the log if it is the log's name",
         ))
     });
     let mut names = BTreeSet::new();

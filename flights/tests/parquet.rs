@@ -239,7 +239,7 @@ fn what_cannot_be_read_is_refused_with_what_it_is() {
     let texts = changed(&[("px", &typed("required binary px (UTF8)", 0.0, 1.0))]);
     says("texts", load(&texts, CHANNELS, ""), &["`position`", "column `px`", "found texts"]);
     let named = CHANNELS.replace("\"px\"", "\"x\"");
-    says("a name", load(&whole, &named, ""), &["no column `x`", "it has t, m1", "correct the name"]);
+    says("a name", load(&whole, &named, ""), &["no column `x`", "it has t, m1", "choose from this list"]);
     let twice = changed(&[("vx", &typed("optional double px", 0.0, 1.0))]);
     says("a name twice", load(&twice, CHANNELS, ""), &["`px` stands 2 times", "6, 9", "\"#6\""]);
     same("of which one is chosen", load(&twice, &CHANNELS.replace("\"px\"", "6"), ""), 0.0);

@@ -139,7 +139,7 @@ fn wrong_files_are_refused_with_line_and_advice() {
         &["line 2, column `pz`: expected an array", "found `1`", "name a column for each number"],
     );
     said(refused(CHANNELS, "from_s = 3\nto_s = 2"), &["flights.toml:", "`flight.0.to_s`", "found 2"]);
-    said(refused(CHANNELS, "from_s = 300"), &["no sample lies", "300", "from_s"]);
+    said(refused(CHANNELS, "from_s = 300"), &["from 300 s on, found none", "set `from_s` and `to_s`"]);
     said(refused(CHANNELS, "format = \"ulog\""), &["no ULog", "check `format`"]);
     said(refused(CHANNELS, "format = \"crazyflie\""), &["no Crazyflie log", "check `format`"]);
     said(refused(CHANNELS, "format = \"mcap\""), &["cannot be read as MCAP", "check `format`"]);

@@ -2,6 +2,7 @@
 
 use crate::foreign::Foreign;
 use crate::quotes::StrayQuote;
+use diagnostics::suggestion;
 
 /// Reason why a file is not a table.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +35,9 @@ pub enum TableError {
         found: Vec<String>,
     },
     /// A line that the file does not have.
-    #[error("`csv.header_line`: expected a line of the file, found {found} of {lines} lines; correct it")]
+    #[error(
+        "`csv.header_line`: expected a line of the file, found {found} of {lines} lines; the first line is 1"
+    )]
     HeaderLine {
         /// The line that is declared.
         found: u64,
@@ -117,12 +120,10 @@ pub enum TableError {
 pub enum ColumnError {
     /// It has none of that name.
     #[error(
-        "no column `{}`; it has {}{}",
+        "no column `{}`; it has {}; {}",
         shown(name),
         names(known),
-        header_line.map_or("; correct the name".to_owned(), |line| format!(
-            "; correct the name, or set `csv.header_line` if line {line} is not the header"
-        ))
+        column_advice(name, known, *header_line)
     )]
     Missing {
         /// The name.
@@ -147,13 +148,27 @@ pub enum ColumnError {
         places: Vec<usize>,
     },
     /// Its number is beyond the last.
-    #[error("no column `{name}`; it has {count} columns, the first of them is \"#1\"; correct the number")]
+    #[error("no column `{name}`; it has {count} columns; the first is \"#1\", the last \"#{count}\"")]
     Number {
         /// The number as it is written.
         name: String,
         /// Number of columns.
         count: usize,
     },
+}
+
+/// Advice on the column `name`, which is none of `known`.
+fn column_advice(name: &str, known: &[String], header_line: Option<u64>) -> String {
+    /// Shorter names differ from each other by as much as from a misspelling.
+    const SHORTEST: usize = 3;
+    let known: Vec<String> = known.iter().map(|name| shown(name)).collect();
+    let question = suggestion(name, known.iter().map(String::as_str)).filter(|_| name.len() >= SHORTEST);
+    question.unwrap_or_else(|| match header_line {
+        Some(line) => {
+            format!("choose from this list, or set `csv.header_line` if line {line} is not the header")
+        }
+        None => "choose from this list".to_owned(),
+    })
 }
 
 /// Text from a file for a message: short, and without characters that a terminal obeys.
@@ -193,5 +208,16 @@ mod tests {
         assert_eq!(shown("\"°\""), "\"°\"");
         assert_eq!(shown(&"x".repeat(50)), "x".repeat(40) + "...");
         assert!(names(&vec!["n".to_owned(); 70]).ends_with("n and 10 more"));
+    }
+
+    #[test]
+    fn a_column_that_is_nearly_right_is_asked_for() {
+        let told = |name: &str, header_line| {
+            let known = vec!["time".to_owned(), "px".to_owned()];
+            ColumnError::Missing { name: name.to_owned(), known, header_line }.to_string()
+        };
+        assert_eq!(told("tme", Some(1)), "no column `tme`; it has time, px; did you mean `time`?");
+        assert!(told("py", None).ends_with("; choose from this list"));
+        assert!(told("q", Some(2)).ends_with("or set `csv.header_line` if line 2 is not the header"));
     }
 }

@@ -107,7 +107,7 @@ fn columns_are_named_by_number_without_a_header() {
     let table = read(rows.as_bytes(), &["#1"], &Dialect::default()).unwrap();
     assert_eq!(
         table.column("#4").unwrap_err().to_string(),
-        "no column `#4`; it has 3 columns, the first of them is \"#1\"; correct the number"
+        "no column `#4`; it has 3 columns; the first is \"#1\", the last \"#3\""
     );
     let named = read(b"#1,#timestamp,a\n1,2,3\n", &["#timestamp"], &Dialect::default()).unwrap();
     assert_eq!((named.column("#1"), named.column("#3"), named.column("#timestamp")), (Ok(0), Ok(2), Ok(1)));

@@ -47,7 +47,7 @@ pub enum RotorError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A recording does not have a topic or a field that the stand file names.
-    #[error("{file}: {cause}; correct {}", if matches!(cause, RecordingError::UnknownTopic { .. }) { "`topic`" } else { "`field`" })]
+    #[error("{file}: {cause}; choose {} from this list", if matches!(cause, RecordingError::UnknownTopic { .. }) { "`topic`" } else { "`field`" })]
     NoField {
         /// The log.
         file: String,
@@ -57,7 +57,8 @@ pub enum RotorError {
     },
     /// A recording states another unit than the stand file.
     #[error(
-        "{file}: the field `{field}` of {topic} is recorded in {recorded}, the stand file says {said}; correct `{key}.unit`"
+        "{file}: the field `{field}` of {topic} is recorded in {recorded}, the stand file says {said}; state the unit of the \
+         recording as `{key}.unit`"
     )]
     Unit {
         /// The log.
@@ -74,7 +75,7 @@ pub enum RotorError {
         key: &'static str,
     },
     /// A log does not have a column that the stand file names.
-    #[error("{file}: no column `{column}`; it has {}; correct the name", known.join(", "))]
+    #[error("{file}: no column `{column}`; it has {}; choose from this list", known.join(", "))]
     NoColumn {
         /// The log.
         file: String,
