@@ -90,6 +90,9 @@ fn a_fault_in_an_effect_is_named_with_its_place() {
         &["`effects.0.name`", "parasitic-drag", "rotordrag"],
     );
     assert_refused(&replaced("coefficient", "factor"), 4, &["unknown key `effects.0.factor`", "coefficient"]);
+    let misspelt = airframe(&replaced("coefficient", "factor"), "").unwrap_err().to_string();
+    let key = format!("bird.toml:{}:1:", HUMMINGBIRD.lines().count() + 4);
+    assert!(misspelt.starts_with(&key), "the key is to blame: {misspelt}");
     assert_refused(&replaced("N*s^2/(m*rad)", "N"), 4, &["`effects.0.coefficient.unit`", "kg/rad", "\"N\""]);
     assert_refused(&replaced("8e-5", "8e-2"), 4, &["`effects.0.coefficient`", "0 to 0.001", "0.08"]);
     assert_refused(&replaced("8e-5", "-1e-9"), 4, &["0 to 0.001"]);

@@ -70,11 +70,17 @@ pub fn gone_or_failed(error: std::io::Error) -> Result<bool> {
 /// Prints a line on standard error. If that is closed or full, the line is lost.
 pub fn say(text: &str) {
     let text = readable(text);
-    let marked = MARKS.iter().find_map(|(mark, style)| Some((mark, style, text.strip_prefix(mark)?)));
-    let _ = match marked.filter(|_| has_colour()) {
-        Some((mark, style, rest)) => writeln!(std::io::stderr(), "{style}{mark}{RESET}{rest}"),
-        None => writeln!(std::io::stderr(), "{text}"),
+    let text = if has_colour() { coloured(&text).into() } else { text };
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// `text` with colours: each of several faults begins a line with a word of its own.
+fn coloured(text: &str) -> String {
+    let line = |line: &str| {
+        let marked = MARKS.iter().find_map(|(mark, style)| Some((mark, style, line.strip_prefix(mark)?)));
+        marked.map_or(line.to_owned(), |(mark, style, rest)| format!("{style}{mark}{RESET}{rest}"))
     };
+    text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// Begins of lines that are coloured on a terminal, and their colours: those of the errors of arguments.
@@ -176,4 +182,19 @@ fn place_json((file, place, key): (&str, Option<&Place>, &str)) -> Value {
 /// Prints warnings on standard error.
 pub fn print_warnings(warnings: &[Diagnostic]) {
     warnings.iter().for_each(|warning| say(&format!("warning: {warning}")));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::coloured;
+
+    #[test]
+    fn each_fault_begins_with_a_coloured_word() {
+        let text = "error: a.toml:1:1: bad\n  |\n1 | error: = 1\nerror: a.toml:2:1: bad, too";
+        let red = "\x1b[1m\x1b[31merror:\x1b[0m";
+        let shown = format!("{red} a.toml:1:1: bad\n  |\n1 | error: = 1\n{red} a.toml:2:1: bad, too");
+        assert_eq!(coloured(text), shown);
+        assert_eq!(coloured("warning: odd"), "\x1b[1m\x1b[33mwarning:\x1b[0m odd");
+        assert_eq!(coloured("passed"), "passed");
+    }
 }

@@ -297,7 +297,8 @@ fn what_cannot_be_identified_on_is_refused_in_words() {
     place.call(&["identify", &flights, "--out", &out]).with_code(2).says(&slow);
     let misspelt = std::fs::read_to_string(&flights).unwrap().replace("\"count\"", "\"counts\"");
     let misspelt = place.write("misspelt.toml", misspelt);
-    let lines = ["misspelt.toml:4:11: flight `short`", "\n4 | command = {", "\n  help: did you mean `count`?"];
+    let lines =
+        ["misspelt.toml:4:11: flight `short`", "\n4 | command = {", "\n  help: did you mean `count`?"];
     place.call(&["identify", &misspelt, "--out", &out]).with_code(2).says(&lines);
     place.call(&["identify", "rotor", &missing, "--out", &out]).with_code(2).says(&["nowhere.toml"]);
 }

@@ -322,6 +322,7 @@ fn samples_that_are_never_read_are_warned_of() {
             &["process.mocap.parameters.delay_ms=300"],
             "at least 300 ms old when they arrive, and `ekf` remembers 200 ms",
         ),
+        (&["process.mocap.outputs.mocap.every_ticks=30"], "67 % of the measurements are never sent"),
     ] {
         let error = told(settings);
         assert!(error.starts_with("warning: ") && error.contains(said), "{settings:?}: {error}");
@@ -331,6 +332,9 @@ fn samples_that_are_never_read_are_warned_of() {
         &["process.imu.period_ticks=4", "process.ekf.period_ticks=2"],
         &["process.controller.period_ticks=4"],
         &["process.mocap.parameters.delay_ms=200"],
+        // A sensor that measures at every tick may send less often, and a sensor with a rate may repeat its measurements.
+        &["process.imu.outputs.imu.every_ticks=2", "process.ekf.period_ticks=2"],
+        &["process.mocap.outputs.mocap.every_ticks=5"],
         &["run.rate_hz=4000", "process.ekf.period_ticks=4", "process.mocap.period_ticks=20"],
     ] {
         assert_eq!(told(harmless), "", "{harmless:?}");

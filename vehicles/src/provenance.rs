@@ -59,6 +59,8 @@ pub struct Stated {
     pub source: String,
     /// Its uncertainty, in the file's unit.
     pub uncertainty: Uncertainty,
+    /// Place of its key.
+    pub key_place: Place,
     /// Place of the number.
     pub place: Place,
     /// Place of the unit.

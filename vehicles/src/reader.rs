@@ -345,6 +345,7 @@ impl<'d, 't> Section<'d, 't> {
         let source = faults.keep(parameter.source());
         let uncertainty = faults.keep(parameter.uncertainty(1.0));
         faults.keep(parameter.finish());
+        let key = self.table.keys().find(|key| **key.get_ref() == *name);
         let stated = (|| {
             Some(Stated {
                 name: name.to_owned(),
@@ -352,6 +353,7 @@ impl<'d, 't> Section<'d, 't> {
                 unit: unit?.to_owned(),
                 source: source?.to_owned(),
                 uncertainty: uncertainty?,
+                key_place: self.doc.place(&key.map_or(parameter.at.clone(), Spanned::span)),
                 place: parameter.doc.place(&value?.span()),
                 unit_place: parameter.doc.place(&parameter.at_of("unit")),
             })

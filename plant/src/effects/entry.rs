@@ -64,7 +64,7 @@ fn refuse_unknown(kind: &'static EffectKind, entry: &EffectEntry) -> Result<(), 
     let unknown = entry.parameters.iter().filter(|stated| !is_known(stated)).map(|unknown| {
         let key = format!("{}.{}", entry.key, unknown.name);
         let error = ParameterError::unknown(key, kind.parameters.iter().map(|spec| spec.name));
-        Err::<(), _>(Diagnostic::at(unknown.place.clone(), error))
+        Err::<(), _>(Diagnostic::at(unknown.key_place.clone(), error))
     });
     Diagnostic::gather(unknown).map(drop)
 }

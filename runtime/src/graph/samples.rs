@@ -1,10 +1,10 @@
-//! Samples that a reader misses because it computes less often than they come, and measurements that come later than
-//! the reader remembers.
+//! Samples that a reader misses because it computes less often than they come, measurements that a sensor does not send, and
+//! measurements that come later than the reader remembers.
 
 use super::parameters::Notes;
 use super::processes::DeclaredNode;
 use bus::context::SampleTimes;
-use bus::plan::{InputPlan, NodePlan, Plan};
+use bus::plan::{InputPlan, NodePlan, OutputPlan, Plan};
 use bus::ports::Inputs;
 use diagnostics::Diagnostic;
 use std::ops::Range;
@@ -17,11 +17,12 @@ const EQUAL_SHARE: f64 = 1e-6;
 /// Field of the messages that state when they were measured.
 const MEASURED: &str = "measured_ns";
 
-/// Warns of samples that are never read, and of measurements that are refused because they come too late.
+/// Warns of samples that are never read, and of measurements that are never sent or are refused because they come too late.
 pub fn check(declared_nodes: &[DeclaredNode<'_>], plan: &Plan, notes: &mut Notes) {
     let wiring = Wires { declared_nodes, plan, notes };
     let mut warnings = Vec::new();
     for (node, declared) in declared_nodes.iter().enumerate() {
+        warnings.extend(plan.nodes[node].outputs.iter().filter_map(|output| wiring.unsent(node, output)));
         // A recorder takes every sample, whatever its period, and a link of 1 tick misses none.
         let is_component = declared.program.component();
         if is_component.is_some_and(|kind| matches!(kind.inputs, Inputs::Any | Inputs::Forwarded { .. })) {
@@ -88,6 +89,32 @@ impl Wires<'_, '_> {
             if measured_s.is_some() { "measure" } else { "send" },
         );
         Some(self.at(node, input, message, help))
+    }
+
+    /// Warning of measurements that `node` never sends, since the manifest states a longer `every_ticks` of `output`. A sensor that
+    /// measures whenever it computes may send less often on purpose.
+    fn unsent(&self, node: usize, output: &OutputPlan) -> Option<Diagnostic> {
+        let (sender, topic) = (&self.plan.nodes[node], &self.plan.topics[output.topic]);
+        let measured_s = self.times(sender).measured_every_s?;
+        let [computed_s, sent_s] =
+            [f64::from(sender.period_ticks), topic.ticks.mean()].map(|ticks| ticks * self.plan.tick_s());
+        let has_own_rate = measured_s > computed_s * (1.0 + EQUAL_SHARE);
+        if !has_own_rate || sent_s <= measured_s * (1.0 + EQUAL_SHARE) {
+            return None;
+        }
+        let (name, port) = (&sender.name, &output.port);
+        let declared = &self.declared_nodes[node];
+        let stated = declared.process.outputs.keys().find(|stated| stated.get_ref() == port)?;
+        let message = format!(
+            "output `{port}` of `{name}`: `{name}` measures {} times a second, {} is sent {} times a second: {:.0} % of the \
+             measurements are never sent",
+            rate(measured_s),
+            topic.name,
+            rate(sent_s),
+            100.0 * (1.0 - measured_s / sent_s),
+        );
+        let help = format!("leave `every_ticks` out, and lower the rate of `{name}` if fewer are enough");
+        Some(declared.manifest.problem(&stated.span(), message, help))
     }
 
     /// Warning of measurements on `input` that come later than `node` remembers.
