@@ -103,7 +103,7 @@ impl Base {
                 }
                 let message = format!("`{key}` has no declared number, which a factor or an offset needs");
                 let error = ParameterError::conflict("key", message);
-                varied.problem(error, "write as = \"value\", or correct the key").into()
+                varied.problem(error, "write as = \"value\", or vary a key with a number").into()
             })?;
             let value = if varied.meaning == Meaning::Factor { declared * drawn } else { declared + drawn };
             Ok((key.clone(), rounded(value)))

@@ -140,7 +140,7 @@ fn at_its_line(files: &InputFiles, path: &Path, vehicle: &Vehicle, error: &Alloc
         Some(FarRotor { number, message, help }) => {
             (format!("rotors.{number}.position"), format!("{message}: {error}"), help)
         }
-        None => (key_of(vehicle, error), error.to_string(), String::new()),
+        None => (key_of(vehicle, error), error.to_string(), error.advice().to_owned()),
     };
     let message = ParameterError::conflict(key.as_str(), message);
     let place = vehicle.provenance.iter().rev().find(|number| number.key == key).and_then(|number| {
@@ -153,7 +153,7 @@ fn at_its_line(files: &InputFiles, path: &Path, vehicle: &Vehicle, error: &Alloc
         Some(place) => Diagnostic::at(place, message),
         None => Diagnostic::in_file(path.display().to_string(), message),
     };
-    if help.is_empty() { fault } else { fault.help(help) }
+    fault.help(help)
 }
 
 #[cfg(test)]

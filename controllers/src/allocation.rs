@@ -59,8 +59,7 @@ pub enum AllocationError {
     /// The rotors do not make thrust and the three torques independently.
     #[error(
         "its {working} working rotors of {rotors} cannot make thrust and three torques independently: {part} is not \
-         controllable{}; expected four or more rotors that push and turn each in a way of its own; correct `rotors` and \
-         `rotor` of the vehicle file",
+         controllable{}; expected four or more rotors that push and turn each in a way of its own",
         why(*part, (*rotors, *working), *is_one_way)
     )]
     Singular {
@@ -76,7 +75,7 @@ pub enum AllocationError {
     /// Within their limits, no speeds of the rotors carry the weight without a torque.
     #[error(
         "its {working} working rotors of {rotors} cannot hover: wherever they carry the weight, a {part} torque remains unbalanced; \
-         expected rotors on both sides of the centre of mass; correct `rotors` of the vehicle file"
+         expected rotors on both sides of the centre of mass"
     )]
     Unbalanced {
         /// Number of rotors.
@@ -89,8 +88,7 @@ pub enum AllocationError {
     /// Within their limits, the rotors do not make a torque both ways while they carry the weight.
     #[error(
         "its {working} working rotors of {rotors} cannot hover: while they carry the weight, {part} is not controllable both ways \
-         within the limits of their speeds{}; correct `rotors` and `command` of the vehicle file, or arrange the rotors so that \
-         the others take over from one that has failed",
+         within the limits of their speeds{}",
         part.turning(*spins)
     )]
     Unheld {
@@ -111,6 +109,35 @@ pub enum AllocationError {
         /// The greatest speed given, rad/s.
         max_rad_s: f64,
     },
+}
+
+impl AllocationError {
+    /// Advice: what to change in the vehicle file.
+    ///
+    /// ```
+    /// use controllers::airframe::ControlledVehicle;
+    ///
+    /// let bird = vehicles::reference::HUMMINGBIRD.replace("counter-clockwise", "clockwise");
+    /// let error = ControlledVehicle::new(vehicles::Vehicle::parse(&bird, "bird.toml")?).unwrap_err();
+    /// assert_eq!(error.advice(), "let half of the rotors turn the other way: `spin`");
+    /// # Ok::<(), diagnostics::Diagnostic>(())
+    /// ```
+    #[must_use]
+    pub fn advice(&self) -> &'static str {
+        match self {
+            Self::Singular { part: Part::Thrust, .. } => {
+                "give `rotor` its `thrust_coefficient`, and `rotors` an `axis` that points upwards"
+            }
+            Self::Singular { working: ..=3, .. } => "fly with four or more working rotors",
+            Self::Singular { part: Part::Yaw, .. } => "let half of the rotors turn the other way: `spin`",
+            Self::Singular { .. } => "move the rotors out of the line: `position`",
+            Self::Unbalanced { .. } => "move the rotors or the centre of mass: `position`",
+            Self::Unheld { .. } => {
+                "change the rotors or the range of `command`, or place the rotors so that others take over from one that has failed"
+            }
+            Self::SpeedRange { .. } => "state the smaller speed as `speed_at_min`",
+        }
+    }
 }
 
 /// The likely reason for a part that is not controllable.

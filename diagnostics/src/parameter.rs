@@ -240,7 +240,7 @@ impl ParameterError {
         match self {
             Self::Missing { .. } => "add it to this table".to_owned(),
             Self::Unknown { .. } => {
-                self.suggestion().unwrap_or_else(|| "remove it, or correct its spelling".to_owned())
+                self.suggestion().unwrap_or_else(|| "remove it, or write one of these keys".to_owned())
             }
             Self::Value { .. } => self.suggestion().unwrap_or_default(),
             Self::File { .. } | Self::Conflict { .. } | Self::Several(_) => String::new(),

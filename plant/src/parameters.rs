@@ -91,7 +91,7 @@ fn tell_initial(vehicle: &Vehicle, commands: &[f64], run: &NodeContext<'_>) {
         "inputs.command",
         format!(
             "the initial value of its input `command` has {command} for rotor {rotor}, counted from 0, expected {} to {}, the \
-             range of `vehicle` \"{}\" (`command.min`, `command.max`); the motor takes it as {end}: correct `initial`",
+             range of `vehicle` \"{}\" (`command.min`, `command.max`); the motor takes it as {end}; state an `initial` within the range",
             map.min, map.max, vehicle.name
         ),
     );
@@ -101,7 +101,7 @@ fn tell_initial(vehicle: &Vehicle, commands: &[f64], run: &NodeContext<'_>) {
 pub(crate) fn unequal(vehicle: &Vehicle, holder: &str, found: usize) -> String {
     format!(
         "{holder} `command` has {found} motor commands, expected {}, one for each rotor of `vehicle` \"{}\"; give plant \
-         and controller the same vehicle file, or correct the input's `initial`",
+         and controller the same vehicle file, and the input's `initial` a number for each rotor",
         vehicle.rotors.len(),
         vehicle.name
     )

@@ -180,7 +180,7 @@ fn answer(
     match ended {
         Some(_) if !said.is_empty() => {
             let advice =
-                advice_on(&words).unwrap_or("correct the manifest or the program as its output says");
+                advice_on(&words).unwrap_or("its output says what to change in the manifest or the program");
             advice.clone_into(&mut help);
         }
         Some(_) => {}

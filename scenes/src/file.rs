@@ -303,7 +303,8 @@ fn check_size(mesh: &Mesh, scale_m: f64) -> Result<(), String> {
     }
     let (min, max) = (MESH_SIZE_M.start(), MESH_SIZE_M.end());
     Err(format!(
-        "its longest side is {size_m:e} m with a unit of {scale_m} m, expected {min} m to {max} m: correct `scale`"
+        "its longest side is {size_m:e} m with a unit of {scale_m} m, expected {min} m to {max} m; set `scale` to the \
+         length of the unit of the mesh"
     ))
 }
 

@@ -251,7 +251,7 @@ fn a_mesh_of_a_size_that_nothing_has_is_refused() {
     for (factor, size) in [(1e30, "3e30 m"), (1e4, "3e4 m"), (1e-4, "e-4 m")] {
         let told = with_mesh("box.obj", TURNED, scaled(factor)).unwrap_err();
         assert!(
-            told.contains("its longest side is") && told.contains(size) && told.contains("correct `scale`"),
+            told.contains("its longest side is") && told.contains(size) && told.contains("set `scale`"),
             "{told}"
         );
     }

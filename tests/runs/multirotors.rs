@@ -205,7 +205,13 @@ fn vehicles_that_cannot_hover_are_refused_with_the_reason() {
             hexacopter_with(&place, FAILED),
             ["its 5 working rotors of 6 cannot hover", "yaw is not controllable both ways"],
         ),
-        (one_way, ["one-way.toml:", "all rotors turn one way, so that yaw follows from thrust"]),
+        (
+            one_way,
+            [
+                "all rotors turn one way, so that yaw follows from thrust",
+                "\n  help: let half of the rotors turn the other way: `spin`\n  named in ",
+            ],
+        ),
     ] {
         let set = format!("process.controller.vehicle={vehicle}");
         let check = ["check", &repository("manifests/hexa-hover.toml"), "--set", &set];

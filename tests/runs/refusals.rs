@@ -426,8 +426,10 @@ fn an_initial_value_that_does_not_fit() {
         refused(initial, &text.replace("{ command = [70, 70, 70, 70] }", value))
     };
     with("{ comand = [70, 70, 70, 70] }").says(&["no field `comand`", "stamp, command"]);
-    with("{ command = [70, 70, 70] }")
-        .says(&["3 motor commands, expected 4, one for each rotor", "correct the input's `initial`"]);
+    with("{ command = [70, 70, 70] }").says(&[
+        "3 motor commands, expected 4, one for each rotor",
+        "the input's `initial` a number for each rotor",
+    ]);
     with("{ command = [70, 70, 70, \"70\"] }").says(&["`command[3]` is \"70\", expected a number"]);
     with("{ command = 70 }").says(&["`command` is 70, expected an array of at most 12"]);
     with("70").says(&["is 70, expected a table of fields", "hummingbus_msgs/msg/MotorCommand"]);

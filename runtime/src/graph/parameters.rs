@@ -182,7 +182,7 @@ fn resolved<'a>(
         if program.component().is_none() {
             read_named(read, key, &named, is_data).map_err(|message| {
                 let message = format!("process `{}`: {message}", name.get_ref());
-                manifest.problem(&file.span(), message, "correct the path, which is relative to the manifest")
+                manifest.problem(&file.span(), message, "give its path relative to the manifest")
             })?;
         }
         if !is_data {

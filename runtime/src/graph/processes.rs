@@ -222,7 +222,7 @@ fn objection(path: &Path) -> Option<(&'static str, &'static str)> {
             "make this Python environment and install hummingbus into it: README.md of the project has the lines with \
              `python3 -m venv` and `pip install`, and so has docs/python.md"
         } else {
-            "build it, or correct the path, which is relative to the manifest"
+            "build it, or give its path relative to the manifest"
         };
         Some(("there is no such file", help))
     } else if !is_executable(path) {
@@ -358,7 +358,7 @@ fn working_directory(manifest: &Manifest, process: &Process) -> Result<Option<Pa
         return Ok(Some(path));
     }
     let message = format!("`working_directory`: {} is no folder", path.display());
-    Err(manifest.problem(&written.span(), message, "make it, or correct the path"))
+    Err(manifest.problem(&written.span(), message, "make this folder, or name another"))
 }
 
 fn log(manifest: &Manifest, process: &Process) -> Result<Option<PathBuf>, Diagnostic> {

@@ -54,7 +54,7 @@ const LEAST: f64 = 1e-30;
 pub fn check(manifest: &Manifest, name: &Spanned<String>, process: &Process) -> Result<(), Diagnostic> {
     let refused = |at: &Spanned<String>, reason: ParameterError| {
         let message = format!("process `{}`: {reason}", name.get_ref());
-        manifest.problem(&at.span(), message, "correct the number or its unit: the key ends in the unit")
+        manifest.problem(&at.span(), message, "look at the unit, with which the key ends")
     };
     let checked = |at, path: &str, key: &str, value| {
         let reasons = within(path, key, value).err().map_or(Vec::new(), ParameterError::into_each);
