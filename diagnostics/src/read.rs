@@ -476,6 +476,7 @@ fn in_words(expected: &dyn de::Expected) -> String {
         "f32" | "f64" => "a number".to_owned(),
         "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, at least 0".to_owned(),
         "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
+        "a string" => "a text".to_owned(),
         "a boolean" => "true or false".to_owned(),
         "a map" => "a table".to_owned(),
         "a sequence" => "a list".to_owned(),

@@ -140,6 +140,7 @@ fn host_settings_that_no_system_has() {
     let with = |key: &str| refused("kind = \"imu\"", &format!("kind = \"imu\"\n{key}"));
     with("nice = §20").says(&["`nice` is 20", "from -20 to 19"]);
     with("realtime_priority = §0").says(&["`realtime_priority` is 0", "from 1 to 99"]);
+    with("nice = §20\nrealtime_priority = 0").says(&["`nice` is 20", "`realtime_priority` is 0"]);
     with("watchdog_ms_host = §0").says(&["`watchdog_ms_host` is 0"]);
     with("working_directory = §\"none\"").says(&["`working_directory`: ", "/none is no folder"]);
     with("log = §\"none/imu.log\"").says(&["`log`: the folder of ", "/none/imu.log is not there"]);
@@ -153,7 +154,7 @@ fn host_settings_that_no_system_has() {
         .says(&["`environment.A` is", "HUMMINGBUS_UNSET is not set"]);
     with("environment.§HUMMINGBUS_RUN = \"x\"").says(&["HUMMINGBUS_RUN is set by the launcher"]);
     with("environment.§\"A=B\" = \"x\"").says(&["cannot be an environment variable"]);
-    with("environment.A = §3").says(&["environment.A` must be a string, found 3"]);
+    with("environment.A = §3").says(&["environment.A` must be a text, found 3"]);
     with("lockstep = §3").says(&["lockstep` must be true or false, found 3"]);
     with("command = §[\"sleep\"]").says(&["process `imu` has both `kind` and `command`"]);
 }

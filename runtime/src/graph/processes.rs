@@ -114,32 +114,46 @@ fn require_no_sidecar(
 /// Program of `process`, with its settings.
 ///
 /// # Errors
-/// If it cannot be started here.
+/// If it cannot be started here: the faults of all of its settings.
 pub fn program(
     manifest: &Manifest,
     name: &Spanned<String>,
     process: &Process,
 ) -> Result<Program, Diagnostic> {
-    require_name(manifest, name)?;
-    let environment = environment(manifest, process)?;
-    require_core(manifest, &process.cpu, "cpu")?;
+    let mut faults = Faults::default();
+    faults.keep(require_name(manifest, name));
+    let environment = faults.keep(environment(manifest, process));
+    faults.keep(require_core(manifest, &process.cpu, "cpu"));
     let help = "no process computes in no time: give milliseconds of host time, such as 20000";
-    let watchdog = manifest.within("watchdog_ms_host", &process.watchdog_ms_host, 1..=u64::MAX, help)?;
-    let (nice, priority) = (&process.nice, &process.realtime_priority);
+    let watchdog = manifest.within("watchdog_ms_host", &process.watchdog_ms_host, 1..=u64::MAX, help);
+    let watchdog = faults.keep(watchdog);
+    let nice = faults.keep(manifest.within("nice", &process.nice, -20..=19, "it goes from -20 to 19"));
+    let priority = &process.realtime_priority;
+    let priority =
+        faults.keep(manifest.within("realtime_priority", priority, 1..=99, "it goes from 1 to 99"));
+    let directory = faults.keep(working_directory(manifest, process));
+    let log = faults.keep(log(manifest, process));
+    // The folders of PATH are those of its environment.
+    let executable = environment
+        .as_ref()
+        .and_then(|environment| faults.keep(executable(manifest, name, process, environment)));
     let first_word = process.command.as_ref().and_then(|command| command.get_ref().first().cloned());
-    Ok(Program {
-        executable: executable(manifest, name, process, &environment)?,
-        first_word: first_word.unwrap_or_default(),
-        environment,
-        working_directory: working_directory(manifest, process)?,
-        nice: manifest.within("nice", nice, -20..=19, "it goes from -20 to 19")?,
-        realtime_priority: manifest.within("realtime_priority", priority, 1..=99, "it goes from 1 to 99")?,
-        on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
-        watchdog: watchdog.map_or(crate::program::WATCHDOG, Duration::from_millis),
-        ready: process.ready.as_ref().map_or(Readiness::Started, |ready| *ready.get_ref()),
-        after: Vec::new(),
-        log: log(manifest, process)?,
-    })
+    let program = (|| {
+        Some(Program {
+            executable: executable?,
+            first_word: first_word.unwrap_or_default(),
+            environment: environment?,
+            working_directory: directory?,
+            nice: nice?,
+            realtime_priority: priority?,
+            on_exit: process.on_exit.as_ref().map_or(OnExit::Stop, |on_exit| *on_exit.get_ref()),
+            watchdog: watchdog?.map_or(crate::program::WATCHDOG, Duration::from_millis),
+            ready: process.ready.as_ref().map_or(Readiness::Started, |ready| *ready.get_ref()),
+            after: Vec::new(),
+            log: log?,
+        })
+    })();
+    faults.finish(program)
 }
 
 fn executable(

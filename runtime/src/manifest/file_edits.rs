@@ -154,9 +154,10 @@ impl FileEdit {
 
     /// True if a fault of the dotted `key` is one of the value of this edit of the file with this `text`.
     pub fn is_about(&self, key: &str, text: &str) -> bool {
-        let mut keys = match text.parse::<DocumentMut>() {
-            Ok(document) => self.keys_in(document.as_item()),
-            Err(_) => self.keys.clone(),
+        let document = text.parse::<DocumentMut>().ok();
+        let mut keys = match &document {
+            Some(document) => self.keys_in(document.as_item()),
+            None => self.keys.clone(),
         };
         // A quantity's faults are those of its own key; the unit and the source stay those of the file.
         if keys.last().is_some_and(|last| last == VALUE) && self.keys.last().is_some_and(|last| last != VALUE)
@@ -167,7 +168,10 @@ impl FileEdit {
             }
         }
         let fault: Vec<&str> = key.split('.').collect();
-        !key.is_empty() && keys.iter().zip(&fault).all(|(a, b)| a == b) && fault.len() >= keys.len().min(2)
+        // A table that the file lacks is there by this edit alone.
+        let is_new = document.is_some_and(|document| !document.contains_key(fault[0]));
+        let depth = if is_new { 1 } else { keys.len().min(2) };
+        !key.is_empty() && keys.iter().zip(&fault).all(|(a, b)| a == b) && fault.len() >= depth
     }
 
     fn require_file(&self, sources: &Sources, content: &Content) -> Result<(), Diagnostic> {
@@ -417,6 +421,14 @@ mod tests {
         assert!(!is_about("body.mass.unit") && !is_about("body.length") && !is_about(""));
         let unit = edit("process.plant.vehicle.body.mass.unit=lb");
         assert!(unit.is_about("body.mass.unit", VEHICLE) && !unit.is_about("body.mass.value", VEHICLE));
+    }
+
+    #[test]
+    fn a_fault_of_a_table_that_an_edit_makes_is_about_that_edit() {
+        let misspelt = edit("process.plant.vehicle.bdoy.mass=1");
+        assert!(misspelt.is_about("bdoy", VEHICLE) && misspelt.is_about("bdoy.mass", VEHICLE));
+        assert!(!misspelt.is_about("body", VEHICLE));
+        assert!(!edit("process.plant.vehicle.body.mass=1").is_about("body", VEHICLE));
     }
 
     #[test]
