@@ -223,6 +223,7 @@ fn schema_components_and_effects_print_one() {
     place.call(&["components", "pit"]).with_code(2).says(&["no component pit", "pid"]);
     let ended = place.call(&["effects", "rotor-drag"]).with_code(0);
     ended.prints(&["rotor-drag: ", "\nequation", "\nholds for", "parameters\n  coefficient  "]);
+    ended.prints(&["file\n  [[effects]]\n  name = \"rotor-drag\"\n  coefficient = { value = "]);
     let one = place.call(&["effects", "rotor-drag", "--json"]).with_code(0).json();
     assert_eq!(one[0]["parameters"][0]["units"][0], "N*s^2/(m*rad)");
     let names = place.call(&["effects"]).with_code(0).output;

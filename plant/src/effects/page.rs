@@ -118,6 +118,24 @@ pub fn plain(kind: &EffectKind) -> String {
             units.join(", ")
         );
     }
+    text.push_str("\nin a vehicle or scene file\n");
+    for line in example(kind).lines() {
+        let _ = writeln!(text, "  {line}");
+    }
+    text
+}
+
+/// An entry of a vehicle or scene file with nominal values: those that have to be given, and the first of the others.
+fn example(kind: &EffectKind) -> String {
+    /// An effect with a value for each rotor has more of them than most vehicles have rotors.
+    const OTHERS: usize = 3;
+    let mut text = format!("[[effects]]\nname = \"{}\"\n", kind.name);
+    for (index, spec) in kind.parameters.iter().enumerate() {
+        if spec.neutral.is_none() || index < OTHERS {
+            let (name, value, unit) = (spec.name, spec.nominal, spec.unit());
+            let _ = writeln!(text, "{name} = {{ value = {value}, unit = \"{unit}\", source = \"none\" }}");
+        }
+    }
     text
 }
 
@@ -153,4 +171,21 @@ fn row(page: &mut String, spec: &ParameterSpec) {
 fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CATALOGUE, example};
+    use crate::effects::entry::resolve;
+
+    #[test]
+    fn the_example_of_each_effect_can_be_pasted() {
+        for kind in CATALOGUE {
+            let entries = vehicles::effects::entries(&example(kind), "example.toml");
+            let effects = resolve(&entries).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
+            assert_eq!(effects.len(), 1, "{}", example(kind));
+            assert_eq!(effects[0].kind.name, kind.name);
+            assert!(effects[0].values.iter().any(|value| *value != 0.0), "{} does something", kind.name);
+        }
+    }
 }
