@@ -151,6 +151,7 @@ impl Summary {
     /// let summary = Summary::new("hover".to_owned(), outcome, 1e-3);
     /// assert_eq!((summary.passed, summary.real_time_factor), (true, 4.0));
     /// assert!(summary.to_string().starts_with("hover: 2000 ticks (2.000 s) in 0.500 s: 4000 ticks/s"));
+    /// assert!(summary.to_string().ends_with("passed: the run completed, and no condition judges it"));
     /// ```
     pub fn new(manifest: String, outcome: Outcome, tick_s: f64) -> Self {
         let ticks = outcome.ticks.saturating_sub(outcome.first_tick);
@@ -276,6 +277,11 @@ impl Summary {
         Ok(())
     }
 
+    /// True if no limit of a condition or of a comparison judges the run.
+    fn has_no_condition(&self) -> bool {
+        self.pass.is_empty() && !self.compare.iter().any(WindowErrors::has_limits)
+    }
+
     /// The first tick by which a condition failed.
     #[must_use]
     pub fn failed_at_tick(&self) -> Option<u32> {
@@ -363,6 +369,9 @@ impl fmt::Display for Summary {
         self.missed_checkpoints.iter().try_for_each(|missed| writeln!(f, "  warning: {missed}"))?;
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
         match (self.passed, refused) {
+            (true, _) if self.has_no_condition() => {
+                write!(f, "passed: the run completed, and no condition judges it")
+            }
             (true, _) => write!(f, "passed"),
             (false, 0) if self.stopped_early => write!(f, "FAILED: stopped before its end"),
             (false, 0) if self.is_unjudged => write!(f, "FAILED: the conditions were not judged"),

@@ -147,6 +147,16 @@ impl WindowErrors {
             passed,
         })
     }
+
+    /// Upper limits of position, velocity and attitude.
+    fn limits(&self) -> [Option<f64>; 3] {
+        [self.max_position_m, self.max_velocity_m_s, self.max_attitude_deg]
+    }
+
+    /// True if a limit judges these errors.
+    pub(crate) fn has_limits(&self) -> bool {
+        self.limits().iter().any(Option::is_some)
+    }
 }
 
 /// True if `value` is a number between the limits that there are.
@@ -190,8 +200,8 @@ impl fmt::Display for WindowErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { simulated, window_s, windows, position_rms_m, velocity_rms_m_s, attitude_rms_deg, .. } =
             self;
-        let limits = [self.max_position_m, self.max_velocity_m_s, self.max_attitude_deg];
-        let mark = match (limits.iter().any(Option::is_some), self.passed) {
+        let limits = self.limits();
+        let mark = match (self.has_limits(), self.passed) {
             (_, false) => "FAILED",
             (true, true) => "ok    ",
             (false, true) => "value ",
