@@ -97,6 +97,16 @@ fn a_path_is_told_without_ways_down_and_up_again() {
     assert!(!ended.error.contains("manifests/.."), "{ended}");
 }
 
+/// An IMU measures whenever it computes.
+#[test]
+fn a_rate_of_a_component_that_has_none_leads_to_its_period() {
+    let ended = refused("kind = \"imu\"", "kind = \"imu\"\nparameters = { §rate_hz = 500.0 }");
+    ended.says(&[
+        "unknown key `rate_hz`",
+        "help: the rate of `imu` follows from `period_ticks` in [process.imu]",
+    ]);
+}
+
 #[test]
 fn a_vehicle_file_with_a_unit_of_another_quantity() {
     let place = Place::new();

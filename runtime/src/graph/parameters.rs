@@ -376,6 +376,9 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
                 "change the values in a copy of the {key} file, and write {key} = \"COPY\" in place of parameters.{key}"
             )
         }
+        ParameterError::Unknown { .. } if key == "rate_hz" => error.suggestion().unwrap_or_else(|| {
+            format!("the rate of `{name}` follows from `period_ticks` in [process.{name}]")
+        }),
         _ => error.suggestion().unwrap_or_default(),
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
