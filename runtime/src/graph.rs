@@ -6,7 +6,7 @@
 //! - `computing_time`: computing time of the steps
 //! - `parameters`, `placeholders`, `recorders`: parameters and files of each node
 //! - `periods`: nodes and outputs that compute only once, or whose ticks would overflow
-//! - `samples`: samples that no reader takes, and measurements that come too late
+//! - `samples`: samples that no reader takes, and measurements that are not sent or come too late
 //! - `ranges`: ranges of numbers by their units
 //! - `groups`: nodes that share a process
 //! - `evaluations`: conditions and measures after the run

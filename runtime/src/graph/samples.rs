@@ -1,5 +1,5 @@
-//! Samples that a reader misses because it computes less often than they come, measurements that a sensor does not send, and
-//! measurements that come later than the reader remembers.
+//! Samples that a reader misses because it computes less often than they come. Measurements that a sensor does not send, or that
+//! come later than the reader remembers.
 
 use super::parameters::Notes;
 use super::processes::DeclaredNode;
