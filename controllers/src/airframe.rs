@@ -133,6 +133,25 @@ fn key_of(vehicle: &Vehicle, error: &AllocationError) -> String {
     }
 }
 
+/// Advice on an error: what to change in the vehicle file.
+fn advice(error: &AllocationError) -> &'static str {
+    match error {
+        AllocationError::Singular { part: Part::Thrust, .. } => {
+            "give `rotor` its `thrust_coefficient`, and `rotors` an `axis` that points upwards"
+        }
+        AllocationError::Singular { working: ..=3, .. } => "fly with four or more working rotors",
+        AllocationError::Singular { part: Part::Yaw, .. } => {
+            "let half of the rotors turn the other way: `spin`"
+        }
+        AllocationError::Singular { .. } => "move the rotors out of the line: `position`",
+        AllocationError::Unbalanced { .. } => "move the rotors or the centre of mass: `position`",
+        AllocationError::Unheld { .. } => {
+            "change the rotors or the range of `command`, or place the rotors so that others take over from one that has failed"
+        }
+        AllocationError::SpeedRange { .. } => "state the smaller speed as `speed_at_min`",
+    }
+}
+
 /// The fault at the number of the vehicle file at `path`, or of its base, that it is about.
 fn at_its_line(files: &InputFiles, path: &Path, vehicle: &Vehicle, error: &AllocationError) -> Diagnostic {
     let far = FarRotor::of(vehicle).filter(|_| matches!(error, AllocationError::Unbalanced { .. }));
@@ -140,7 +159,7 @@ fn at_its_line(files: &InputFiles, path: &Path, vehicle: &Vehicle, error: &Alloc
         Some(FarRotor { number, message, help }) => {
             (format!("rotors.{number}.position"), format!("{message}: {error}"), help)
         }
-        None => (key_of(vehicle, error), error.to_string(), error.advice().to_owned()),
+        None => (key_of(vehicle, error), error.to_string(), advice(error).to_owned()),
     };
     let message = ParameterError::conflict(key.as_str(), message);
     let place = vehicle.provenance.iter().rev().find(|number| number.key == key).and_then(|number| {

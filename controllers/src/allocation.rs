@@ -111,35 +111,6 @@ pub enum AllocationError {
     },
 }
 
-impl AllocationError {
-    /// Advice: what to change in the vehicle file.
-    ///
-    /// ```
-    /// use controllers::airframe::ControlledVehicle;
-    ///
-    /// let bird = vehicles::reference::HUMMINGBIRD.replace("counter-clockwise", "clockwise");
-    /// let error = ControlledVehicle::new(vehicles::Vehicle::parse(&bird, "bird.toml")?).unwrap_err();
-    /// assert_eq!(error.advice(), "let half of the rotors turn the other way: `spin`");
-    /// # Ok::<(), diagnostics::Diagnostic>(())
-    /// ```
-    #[must_use]
-    pub fn advice(&self) -> &'static str {
-        match self {
-            Self::Singular { part: Part::Thrust, .. } => {
-                "give `rotor` its `thrust_coefficient`, and `rotors` an `axis` that points upwards"
-            }
-            Self::Singular { working: ..=3, .. } => "fly with four or more working rotors",
-            Self::Singular { part: Part::Yaw, .. } => "let half of the rotors turn the other way: `spin`",
-            Self::Singular { .. } => "move the rotors out of the line: `position`",
-            Self::Unbalanced { .. } => "move the rotors or the centre of mass: `position`",
-            Self::Unheld { .. } => {
-                "change the rotors or the range of `command`, or place the rotors so that others take over from one that has failed"
-            }
-            Self::SpeedRange { .. } => "state the smaller speed as `speed_at_min`",
-        }
-    }
-}
-
 /// The likely reason for a part that is not controllable.
 fn why(part: Part, (rotors, working): (usize, usize), is_one_way: bool) -> &'static str {
     match part {
