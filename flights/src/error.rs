@@ -395,19 +395,24 @@ fn write_advice(advice: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     if f.alternate() { Ok(()) } else { write!(f, "; {advice}") }
 }
 
+/// Bytes of the shortest word that may be misspelt: shorter ones, such as units, are near to all others of their length.
+const SHORTEST: usize = 3;
+
 /// Advice on the name `name`, which is none of `known`, in the key `key`.
 fn choose(name: &str, known: &[String], key: &str) -> String {
     // Another element of the same array is no other spelling.
     let array = |name: &str| name.split_once('[').map(|(array, _)| array.to_owned());
     let others = known.iter().filter(|other| array(name).is_none() || array(other) != array(name));
-    suggestion(name, others.map(String::as_str)).unwrap_or_else(|| format!("choose {key} from this list"))
+    let question = suggestion(name, others.map(String::as_str)).filter(|_| name.len() >= SHORTEST);
+    question.unwrap_or_else(|| format!("choose {key} from this list"))
 }
 
 /// The question for the word that was probably meant, if `expected` is a choice of words in quotes.
 fn meant(expected: &str, found: &str) -> Option<String> {
     let word = |text: &str| Some(text.strip_prefix('"')?.strip_suffix('"')?.to_owned());
     let words: Vec<String> = expected.split(" or ").map(word).collect::<Option<_>>()?;
-    suggestion(&word(found)?, words.iter().map(String::as_str))
+    let found = word(found).filter(|found| found.len() >= SHORTEST)?;
+    suggestion(&found, words.iter().map(String::as_str))
 }
 
 /// The names there are; shortened where they are many.
@@ -488,6 +493,7 @@ mod tests {
     #[test]
     fn a_name_that_is_nearly_right_is_asked_for() {
         assert_eq!(unit("counts").advice(), "did you mean `count`?");
+        assert_eq!(unit("V").advice(), "write one of these units", "one letter is no misspelt %");
         let topics = ["/imu/imu", "/mocap/mocap"];
         let topic = LogError::missing("topic", "/mocap/mocp", topics, "`topic`");
         assert_eq!(topic.advice(), "did you mean `/mocap/mocap`?");
