@@ -59,16 +59,16 @@ impl<C: Component> Harness<C> {
     /// outputs are due at each step.
     ///
     /// ```
-    /// use bus::component::{Component, Info, StepError};
-    /// use bus::context::{NodeContext, StepContext};
-    /// use bus::messages::{PlannedPath, SetPoint};
-    /// use bus::ports::OutputNumber;
-    /// use bus::sample_ticks::SampleTicks;
+    /// use component::{Component, Info, StepError};
+    /// use component::context::{NodeContext, StepContext};
+    /// use component::messages::{PlannedPath, SetPoint};
+    /// use component::ports::OutputNumber;
+    /// use component::sample_ticks::SampleTicks;
     ///
     /// /// Asks for a hover, and sends its way there.
     /// struct Planner;
     ///
-    /// #[derive(bus::OutputPorts)]
+    /// #[derive(component::OutputPorts)]
     /// struct Outputs {
     ///     set_point: SetPoint,
     ///     path: Option<PlannedPath>,
@@ -83,7 +83,7 @@ impl<C: Component> Harness<C> {
     ///     type Outputs = Outputs;
     ///     type State = ();
     ///
-    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, bus::ParameterError> {
+    ///     fn new(_: Self::Parameters, _: &NodeContext<'_>) -> Result<Self, component::ParameterError> {
     ///         Ok(Self)
     ///     }
     ///
@@ -95,7 +95,7 @@ impl<C: Component> Harness<C> {
     ///     }
     /// }
     ///
-    /// let planner = bus::Harness::<Planner>::from_json(&serde_json::json!({})).unwrap();
+    /// let planner = component::Harness::<Planner>::from_json(&serde_json::json!({})).unwrap();
     /// let mut planner = planner.sending("path", Some(SampleTicks::every(3)));
     /// let planned: Vec<u32> = (0..8).filter(|_| planner.step(()).unwrap().path.is_some()).collect();
     /// assert_eq!(planned, [0, 3, 6]);

@@ -12,7 +12,7 @@ pub use crate::state::{State, StateError, Transfer};
 /// Error of a step, in words. Any error, and any text, becomes one by `?` or `into`.
 ///
 /// ```
-/// let too_low: component::component::StepError = "the battery is empty".into();
+/// let too_low: component::StepError = "the battery is empty".into();
 /// assert_eq!(too_low.to_string(), "the battery is empty");
 /// ```
 pub type StepError = Box<dyn std::error::Error + Send + Sync>;
@@ -26,7 +26,7 @@ pub type StepError = Box<dyn std::error::Error + Send + Sync>;
 /// ([`Harness`](crate::Harness)) and a thread can host it.
 ///
 /// ```
-/// use component::component::{Component, Info, StepError};
+/// use component::{Component, Info, StepError};
 /// use component::context::{NodeContext, StepContext};
 /// use component::messages::{PlantState, SetPoint};
 ///
@@ -147,7 +147,7 @@ pub trait Component: Sized + Send {
     /// the run went on. It is asked for once, off the tick path.
     ///
     /// ```
-    /// use component::component::{Component, Info, StepError};
+    /// use component::{Component, Info, StepError};
     /// use component::context::{NodeContext, StepContext};
     ///
     /// /// Finds no root in every fourth step, and takes the nearest number.
@@ -207,7 +207,7 @@ pub trait Component: Sized + Send {
 /// Condition that cannot hold any more.
 ///
 /// ```
-/// use component::component::Failure;
+/// use component::Failure;
 ///
 /// let failure = Failure { condition: "touches nothing".to_owned(), time_ns: 1_500_000 };
 /// assert_eq!(failure.time_ns / 1_000_000, 1, "tick 1 at 1 kHz");
@@ -226,7 +226,7 @@ pub type FirstFailure = fn(&[u8]) -> Option<Failure>;
 /// Description of a component.
 ///
 /// ```
-/// use component::component::{Info, Role};
+/// use component::{Info, Role};
 ///
 /// const LOGGER: Info = Info::new("logger", "writes what it reads to a file").recorder();
 /// assert_eq!((LOGGER.name, LOGGER.role), ("logger", Role::Record));
@@ -266,7 +266,7 @@ impl Info {
     /// The same component, which takes the place of another one only if it goes on from its state; `reason` says why.
     ///
     /// ```
-    /// use component::component::Info;
+    /// use component::Info;
     ///
     /// const WORLD: Info = Info::new("world", "moves bodies").needing_state("the bodies would be lost");
     /// assert!(WORLD.needs_state.is_some());

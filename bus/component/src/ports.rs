@@ -37,10 +37,10 @@ pub struct PortSpec {
 /// In a constant, a name that is not declared is an error of the compiler:
 ///
 /// ```
-/// use bus::messages::{PlannedPath, Reference};
-/// use bus::ports::OutputNumber;
+/// use component::messages::{PlannedPath, Reference};
+/// use component::ports::OutputNumber;
 ///
-/// #[derive(bus::OutputPorts)]
+/// #[derive(component::OutputPorts)]
 /// struct Outputs {
 ///     reference: Reference,
 ///     path: Option<PlannedPath>,

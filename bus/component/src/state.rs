@@ -29,7 +29,7 @@ pub enum Transfer {
 /// not be saved.
 ///
 /// ```
-/// use component::component::{State, StateError, Transfer};
+/// use component::{State, StateError, Transfer};
 ///
 /// /// The samples of a moving average. Its length is a parameter.
 /// struct Window(Vec<f64>);
