@@ -4,8 +4,8 @@
 //! The derive refuses a struct that is not `repr(C)`, has implicit padding, or has a field name that ROS 2
 //! tools reject. A floating-point field without its unit is refused too.
 //!
-//! The generated code names the crate `component` over the package that the `Cargo.toml` of the deriving crate depends on:
-//! `hummingbus-component`, `hummingbus-bus` or `hummingbus`.
+//! The generated code names the crate `component`. The `Cargo.toml` of the deriving crate has a dependency on it, or on a package
+//! that exports it: `hummingbus-component`, `hummingbus-bus` or `hummingbus`.
 
 mod fields;
 mod parameters;
@@ -29,15 +29,17 @@ pub fn derive_message(input: TokenStream) -> TokenStream {
 }
 
 fn expanded(input: &DeriveInput, expand: fn(&DeriveInput) -> Result<Tokens>) -> TokenStream {
-    let (root, expanded) = (root::path(), expand(input).unwrap_or_else(Error::into_compile_error));
-    quote! {
-        const _: () = {
-            use #root as __component;
+    let expanded = root::path().and_then(|root| {
+        let items = expand(input)?;
+        Ok(quote! {
+            const _: () = {
+                use #root as __component;
 
-            #expanded
-        };
-    }
-    .into()
+                #items
+            };
+        })
+    });
+    expanded.unwrap_or_else(Error::into_compile_error).into()
 }
 
 fn expand(input: &DeriveInput) -> Result<Tokens> {
