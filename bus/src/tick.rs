@@ -51,12 +51,6 @@ impl Tick<'_> {
         self.inputs[input.index].host_times_ns(self.locals)
     }
 
-    /// True if `output` is due at this tick.
-    #[must_use]
-    pub fn is_due<T>(&self, output: Output<T>) -> bool {
-        self.outputs[output.index].is_due(self.tick)
-    }
-
     /// Writes the sample of `output`; the bus fills in its stamp. A sample that is not due is dropped.
     ///
     /// # Errors

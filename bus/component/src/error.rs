@@ -293,7 +293,7 @@ pub enum BusError {
     #[error(
         "node `{node}` failed at tick {tick} (t = {time_s:.3} s): its output {output} says that {field} has {found} \
          values, expected at most {most}, and zeros behind them; the sample was not sent. Make the values with \
-         `bus::Bounded`, which keeps both"
+         `Bounded`, which keeps both"
     )]
     Count {
         /// The node.
