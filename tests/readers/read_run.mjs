@@ -120,7 +120,10 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.focus("#swap-yes");
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => !document.getElementById("swap").open);
-  found.marks = await page.evaluate(() => window.hummingbus.scopes.marks.filter(({ kind }) => kind === "swap"));
+  // The server tells all pages of it.
+  const swaps = () => (window.hummingbus.scopes?.marks ?? []).filter(({ kind }) => kind === "swap");
+  await page.waitForFunction(`(${swaps})().length > 0`);
+  found.marks = await page.evaluate(swaps);
   found.swapped = await look();
 
   // A sensor whose measurements come at other ticks, which is warned of.
@@ -138,6 +141,8 @@ const seen = await withPage(address, async (page, wrong) => {
   const other = await page.browser().newPage();
   await other.goto(address, { waitUntil: "load" });
   await awaitState("running", other);
+  await other.waitForFunction(`(${swaps})().length > 1`);
+  found.otherMarks = await other.evaluate(swaps);
   await page.bringToFront();
   await blur();
   await page.keyboard.press("p");

@@ -100,8 +100,11 @@ fn require_controls(seen: &Value) {
     );
     assert_eq!(
         (&seen["marks"][0]["text"], seen["marks"].as_array().unwrap().len()),
-        (&json!("swap of controller"), 1)
+        (&json!("controller.1 takes over"), 1)
     );
+    let texts =
+        |key: &str| seen[key].as_array().unwrap().iter().map(|mark| mark["text"].clone()).collect::<Vec<_>>();
+    assert_eq!(texts("otherMarks"), ["controller.1 takes over", "mocap.1 takes over"]);
     require_warning(&seen["warned"]);
     assert_eq!(seen["other"]["shown"], "paused");
     assert_eq!((&seen["kept"]["shown"], &seen["ended"]["shown"]), (&json!("paused"), &json!("ended")));

@@ -141,7 +141,7 @@ function hearOf(run) {
       // A run that has gone back begins another recording; the plots are in the address.
       if (starts !== null && told.starts > starts && starts > 0) location.reload();
       starts = told.starts;
-      run.take(told.run);
+      run.take(told.run, told.take_overs);
       reportHeld(isBehind() ? HELD : "");
       isHeard();
     }, reportServer);

@@ -36,7 +36,7 @@ export class RunControls {
   #heardPace = [];
 
   constructor() {
-    /** Marks on the axis of time that no recording has: swaps by this page, and missed deadlines. */
+    /** Marks on the axis of time that no recording has: take-overs, and missed deadlines. */
     this.marks = [];
     this.status = null;
     this.facts = null;
@@ -55,13 +55,14 @@ export class RunControls {
   }
 
   /** Takes the state of the run; null where there is none, or none that can be steered. */
-  async take(status) {
+  async take(status, takeOvers) {
     const before = this.status;
     this.status = status;
     get("run").hidden = status === null;
     if (status === null) return;
     if (before && before.state !== "ended") this.#sayEnd();
     this.#markLate(before);
+    this.#markTakeOvers(takeOvers);
     if (before?.pace !== status.pace) {
       this.#choosePace(status.pace);
       for (const hear of this.#heardPace) hear(status.pace);
@@ -138,7 +139,6 @@ export class RunControls {
       // A later request has the place by now.
       if (number === this.asking || !isDone) say(words(answer), !isDone);
       // The news of the end may have come before.
-      if (isDone && request.request === "swap") this.#markSwap(request, answer);
       if (isDone) this.#sayEnd();
       return isDone;
     } catch (error) {
@@ -147,10 +147,12 @@ export class RunControls {
     }
   }
 
-  /** Marks a swap, which is answered when the backup has taken over. */
-  #markSwap({ process, at_tick: atTick }, { tick }) {
-    const atS = (atTick ?? tick) * (this.facts?.tick_s ?? 0);
-    this.marks.push({ kind: "swap", from_s: atS, text: `swap of ${process}` });
+  /** Marks each process that has taken over: by a swap of anybody, as a standby, or started again. */
+  #markTakeOvers(takeOvers) {
+    const marked = this.marks.filter(({ kind }) => kind === "swap").length;
+    for (const { process, generation, time_s: timeS } of takeOvers.slice(marked)) {
+      this.marks.push({ kind: "swap", process, from_s: timeS, text: `${process}.${generation} takes over` });
+    }
   }
 
   toggle() {

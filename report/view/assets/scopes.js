@@ -17,6 +17,8 @@ const LIMIT_REACH = 1.5;
 // Distance at which a mark is under the pointer, and marks that are told of at once.
 const NEAR_PX = 5;
 const HINTS_MAX = 4;
+// A take-over of the live run within this time of a planned swap is that swap.
+const SAME_S = 0.05;
 // A fault is a strip at the top of a plot, in which the pointer finds its text.
 const FAULT_PX = 4;
 const ROTORS_MAX = 12;
@@ -402,7 +404,9 @@ export class Scopes {
     const own = others.flatMap((recording, index) => recording.marks
       .filter((mark) => !texts.has(JSON.stringify(mark)))
       .map((mark) => ({ ...mark, recording: index + 1, text: `${mark.text} of ${recording.name}` })));
-    return [...first.marks.map((mark) => ({ ...mark, recording: 0 })), ...own, ...this.liveMarks];
+    // A swap of the manifest is a mark of the recording, too.
+    const isPlanned = ({ process, from_s: from }) => first.marks.some((mark) => mark.text === `swap of ${process}` && Math.abs(mark.from_s - from) < SAME_S);
+    return [...first.marks.map((mark) => ({ ...mark, recording: 0 })), ...own, ...this.liveMarks.filter((mark) => !isPlanned(mark))];
   }
 
   #add(fields) {

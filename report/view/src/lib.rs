@@ -15,6 +15,7 @@
 //! | [`live`] | the live run behind a page: its state, and the requests of the page |
 //! | `newest` | the newest values of that run, ahead of its recording |
 //! | `schedule` | the tick of that run as planned, and as it goes |
+//! | `take_overs` | the processes of that run that took over from others |
 //! | `layouts` | the layouts of scopes that a user keeps |
 //! | `pages` | the pages that are open, and their events |
 //! | `gate` | requests that are let in |
@@ -46,6 +47,7 @@ mod readers;
 mod schedule;
 pub mod server;
 pub mod shown;
+mod take_overs;
 #[cfg(test)]
 mod tests;
 mod vehicles;

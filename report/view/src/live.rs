@@ -4,6 +4,7 @@ use crate::fields::Asked as Field;
 use crate::newest::Newest;
 use crate::schedule::Schedule;
 use crate::shown::Shown;
+use crate::take_overs::{TakeOver, TakeOvers};
 use anyhow::{Context as _, Result, ensure};
 use bus::asked::{Asked, AskedFile};
 use bus::lockstep::LiveView;
@@ -34,6 +35,7 @@ pub struct Live {
     plan: Plan,
     schedule: Schedule,
     newest: Mutex<Newest>,
+    take_overs: Mutex<TakeOvers>,
     /// Opened at the first look that finds it.
     control: OnceLock<LiveView>,
 }
@@ -42,7 +44,15 @@ impl Live {
     /// The run that flies `plan`.
     pub fn of(run: LiveRun, plan: Plan) -> Self {
         let newest = Mutex::new(Newest::of(&run, &plan));
-        Self { run: Arc::new(run), plan, schedule: Schedule::default(), newest, control: OnceLock::new() }
+        let take_overs = Mutex::default();
+        Self {
+            run: Arc::new(run),
+            plan,
+            schedule: Schedule::default(),
+            newest,
+            take_overs,
+            control: OnceLock::new(),
+        }
     }
 
     /// True while the launcher of the run lives.
@@ -57,6 +67,13 @@ impl Live {
             status.state = State::Ended;
         }
         Some(status)
+    }
+
+    /// Processes that have taken over from others since the first look.
+    pub(crate) fn take_overs(&self) -> Vec<TakeOver> {
+        let Some(control) = self.control() else { return Vec::new() };
+        let mut take_overs = self.take_overs.lock().unwrap_or_else(PoisonError::into_inner);
+        take_overs.look(&self.run.entry.run_dir, &self.plan, control)
     }
 
     /// The tick as planned and as it goes; null until the run has a control segment.

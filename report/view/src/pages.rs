@@ -3,6 +3,7 @@
 //! Each page keeps one stream of events open for its life. So the server knows that a page is there, also one in the
 //! background, whose timers a browser slows down.
 
+use crate::take_overs::TakeOver;
 use axum::response::sse::Event;
 use futures_util::stream::{self, Stream};
 use runtime::ctl::protocol::Status;
@@ -60,6 +61,8 @@ impl<T: AsRef<Pages>> Drop for Place<T> {
 pub struct News {
     /// State of the live run; none without one, or where it cannot be steered.
     pub run: Option<Status>,
+    /// Processes of that run that have taken over from others.
+    pub take_overs: Vec<TakeOver>,
     /// Number of recordings.
     pub recordings: usize,
     /// Times that the live run has started.

@@ -117,8 +117,10 @@ impl Content {
     }
 
     fn news(&self) -> News {
+        let live = self.live();
         News {
-            run: self.live().and_then(|live| live.status()),
+            run: live.as_ref().and_then(|live| live.status()),
+            take_overs: live.map_or(Vec::new(), |live| live.take_overs()),
             recordings: self.recordings().len(),
             starts: self.starts.load(Ordering::Relaxed),
         }
@@ -163,7 +165,7 @@ impl Handle {
     /// Looks at the live run, so that its state is known to the end, also to a page that is opened behind it. A run that has
     /// ended cannot be looked at for the first time.
     pub fn look(&self) {
-        let _ = self.0.live().map(|live| live.status());
+        let _ = self.0.live().map(|live| (live.status(), live.take_overs()));
     }
 
     /// Sends pages the reason why there is nothing to show.
