@@ -72,11 +72,12 @@ fn named(folder: &Path, import: &Import<'_>, place: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Text of the file at `path`; `None` if it is not a regular file, is long, or cannot be read.
+/// Text of the file at `path`, without the byte order mark that some editors write. `None` if it is not a regular file, is long, or
+/// cannot be read.
 fn text_of(path: &Path) -> Option<String> {
     let is_short = path.metadata().is_ok_and(|file| file.is_file() && file.len() <= SEARCHED_BYTES_MAX);
     let bytes = is_short.then(|| std::fs::read(path).ok())??;
-    Some(String::from_utf8_lossy(&bytes).replace("\r\n", "\n"))
+    Some(String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}').replace("\r\n", "\n"))
 }
 
 fn is_python(path: &Path, text: &str) -> bool {
@@ -227,7 +228,8 @@ mod tests {
             ("pack/part.py", "from . import beside\nfrom .. import above\nfrom ... import outside\n"),
             ("pack/beside.py", "import inner\n"),
             ("pack/inner.py", ""),
-            ("pack/other.py", ""),
+            ("pack/other.py", "\u{feff}import marked\n"),
+            ("marked.py", ""),
             ("space/deep/leaf.py", "from .leaf import again\n"),
             ("above.py", ""),
             ("inner.py", ""),
@@ -238,6 +240,7 @@ mod tests {
             "above.py",
             "gains.py",
             "inner.py",
+            "marked.py",
             "pack/__init__.py",
             "pack/beside.py",
             "pack/inner.py",
