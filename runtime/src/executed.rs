@@ -4,7 +4,7 @@
 use crate::imported::Modules;
 use crate::program::{Executable, Program};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata};
 use std::io::{self, Seek as _};
 use std::os::unix::fs::MetadataExt as _;
@@ -136,11 +136,14 @@ fn words(program: &Program) -> impl Iterator<Item = (&str, PathBuf)> {
 /// of its scripts.
 fn files(program: &Program) -> Vec<(String, PathBuf)> {
     let mut files: Vec<_> = words(program).map(|(word, path)| (word.to_owned(), path)).collect();
+    // A word may lead over a link. The folder of modules has none on its way.
+    let mut known: BTreeSet<PathBuf> =
+        words(program).filter_map(|(_, path)| path.canonicalize().ok()).collect();
     for (word, path) in words(program) {
         let Some(Modules { folder, files: modules }) = Modules::of(&path) else { continue };
         for module in modules {
             let path = folder.join(&module);
-            if files.iter().all(|(_, known)| *known != path) {
+            if path.canonicalize().is_ok_and(|path| known.insert(path)) {
                 let name = Path::new(word).parent().unwrap_or(Path::new("")).join(module);
                 files.push((name.to_string_lossy().into_owned(), path));
             }
@@ -337,6 +340,22 @@ mod tests {
         assert!(told.len() == 1 && told[0].contains("gains.py has changed"), "{told:?}");
         // An output is told of words alone: no command writes its own modules.
         assert!(executed.end(&programs).is_empty());
+    }
+
+    #[test]
+    fn a_module_that_is_a_word_too_is_told_once_although_a_link_leads_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (laws, link) = (folder.path().join("laws"), folder.path().join("link"));
+        fs::create_dir(&laws).unwrap();
+        std::os::unix::fs::symlink(&laws, &link).unwrap();
+        fs::write(laws.join("law.py"), "import gains\n").unwrap();
+        fs::write(laws.join("gains.py"), "THRUST = 1\n").unwrap();
+        let program = Program { working_directory: Some(link), ..command(["python3", "law.py", "gains.py"]) };
+        let mut executed = Executed::default();
+        assert!(executed.begin(&[("pilot", &program)]).is_empty());
+        fs::write(laws.join("gains.py"), "THRUST = 1.5\n").unwrap();
+        let told = executed.note("pilot", &program);
+        assert!(told.len() == 1 && told[0].contains("gains.py has changed"), "{told:?}");
     }
 
     #[test]
