@@ -1,6 +1,6 @@
 //! The lockstep bus: the plan of a run, the node loop, the clock service and the transport.
 //!
-//! Components, their ports, messages and parameters are in the crate [`component`](::component), which this crate exports
+//! Components, their ports, messages and parameters are in the crate [`component`], which this crate exports
 //! again: `bus::messages` is `component::messages`.
 //!
 //! To write a component, use [`Component`], its [contexts](context), [messages] or a [message of its own](Message),
@@ -93,7 +93,6 @@ mod transport;
 pub mod user_file;
 pub mod watch;
 
-#[doc(inline)]
 pub use ::component;
 pub use ::component::{
     Bounded, BusError, Component, FileKind, FileRole, Harness, InputFiles, InputMemory, InputMessages,
