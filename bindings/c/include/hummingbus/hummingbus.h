@@ -239,8 +239,7 @@ void *hb_tick_output(struct HbTick *tick,
 //
 // # Safety
 // As `hb_tick_number`.
-const void *hb_tick_predecessor(struct HbTick *tick,
-                                uint32_t output);
+const void *hb_tick_predecessor(struct HbTick *tick, uint32_t output);
 
 // Ends the run with `reason` when the step returns. Returns `HB_FAILED`, so that a step can return it.
 //
