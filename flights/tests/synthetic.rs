@@ -126,7 +126,7 @@ fn wrong_files_are_refused_with_line_and_advice() {
     );
     said(
         refused(&CHANNELS.replace("\"m\" ", "\"ft\" "), ""),
-        &["flights.toml:5:", "\"ft\"", "\"mm\"", "correct"],
+        &["flights.toml:5:", "\"ft\"", "\"mm\"", "write one of these"],
     );
     said(refused(&CHANNELS.replace("position", "positon"), ""), &["flights.toml:5:", "positon", "position"]);
     said(refused(&CHANNELS.replace("time =", "# time ="), ""), &["no channel `time`", "add `time"]);

@@ -172,7 +172,7 @@ fn angles_in_another_unit_are_found() {
     assert!(found.len() == 1 && found[0].1.ends_with("or `unit = \"rad\"` of `attitude`"), "{found:?}");
     let degrees = Motion { angle_unit: 57.295_779_5, ..Motion::default() };
     let text = read(&degrees, &poses("rad"), "").unwrap_err().to_string();
-    assert!(text.contains("`unit = \"deg\"` would fit"), "{text}");
+    assert!(text.contains("write `unit = \"deg\"`, which would fit"), "{text}");
     assert!(read(&degrees, &poses("rad"), "trust_units = true").is_ok());
 }
 

@@ -741,7 +741,9 @@ mod tests {
         assert!(text.contains(nothing), "{text}");
         report.verdict.push("parasitic-drag");
         let text = report.to_string();
-        assert!(text.contains("verdict: parasitic-drag\nfitted and not named: sensor-bias: "), "{text}");
+        let named = text.find("verdict: parasitic-drag\n").unwrap();
+        let below = text.find("\nfitted and not named: sensor-bias: ").unwrap();
+        assert!(named < below, "{text}");
     }
 
     #[test]

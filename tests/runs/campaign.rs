@@ -301,8 +301,8 @@ fn an_unknown_key_of_a_file_is_told_without_a_value_and_without_detours_in_paths
             "hold.frequency",
             "process.controller.gains.hold.frequency: unknown key `hold.frequency`".to_owned(),
         ),
-        ("holdx.frequency", format!("{gains}: unknown key `holdx`")),
-        ("holdx.frequency", ", with process.controller.gains.holdx.frequency of ".to_owned()),
+        ("holdx.frequency", "process.controller.gains.holdx.frequency: unknown key `holdx`".to_owned()),
+        ("holdx.frequency", "did you mean `hold`?".to_owned()),
         ("hold.distance.value.x", format!("{gains} shows the keys")),
     ] {
         // The manifest includes one in another folder, which names the gains file from there.
