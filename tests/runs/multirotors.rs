@@ -209,7 +209,7 @@ fn vehicles_that_cannot_hover_are_refused_with_the_reason() {
             one_way,
             [
                 "all rotors turn one way, so that yaw follows from thrust",
-                "\n  help: let half of the rotors turn the other way: `spin`\n  named in ",
+                "\n  help: let half of the rotors turn the other way: `spin`\n",
             ],
         ),
     ] {
