@@ -95,7 +95,7 @@ fn an_output_is_due_at_its_ticks_under_every_host_and_for_a_successor() {
         |described: ManifestBuilder| described.build(&folder.path().join("a.toml"), COMPONENTS).unwrap();
     let alone = build(described());
     let swap = toml::toml! { process = "source"
-    at_tick = 200
+    at_tick = 203
     shadow_ticks = 20 };
     let swapped = build(described().add("swap", swap));
     for (case, launcher, manifest) in [
