@@ -180,7 +180,8 @@ impl Chain {
     }
 
     fn step(&mut self) -> std::result::Result<(), bus::component::StepError> {
-        let inputs = plant::node::Inputs { command: &self.command, measured: None, traffic: None };
+        let inputs =
+            plant::node::Inputs { command: &self.command, measured: None, battery: None, traffic: None };
         self.state = self.plant.step(inputs)?.state;
         let imu = self.imu.step(TruthInputs { state: &self.state })?.imu;
         if self.mocap.tick < self.imu.tick {

@@ -3,7 +3,7 @@
 use component::Bounded;
 use component::messages::PerRotor;
 use diagnostics::ParameterError;
-use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY};
+use diagnostics::unit::{COUNT, Dimension, LENGTH, PURE_NUMBER, SPEED, TIME, VELOCITY, VOLTAGE};
 use inputs::InputFiles;
 use serde::Deserialize;
 use std::fmt::Display;
@@ -80,12 +80,16 @@ pub struct ColumnMap {
     /// Angular velocity in the body, 3 columns.
     #[parameter(unit = "`rad/s`, `deg/s`")]
     pub angular_velocity: Columns<3>,
+    /// Voltage at the terminals of the battery. It is played as it stands, noise included.
+    #[parameter(unit = "`V`, `mV`", shown = "not played")]
+    pub battery_voltage: Option<Columns<1>>,
 }
 
 impl ColumnMap {
     fn names(&self) -> Vec<&str> {
         let vectors = [&self.position.columns, &self.velocity.columns, &self.angular_velocity.columns];
-        let rest = self.command.columns.iter().chain(&self.attitude.columns);
+        let voltage = self.battery_voltage.iter().flat_map(|map| &map.columns);
+        let rest = self.command.columns.iter().chain(&self.attitude.columns).chain(voltage);
         self.time
             .columns
             .iter()
@@ -111,6 +115,8 @@ pub struct Row {
     pub attitude: [f64; 4],
     /// Angular velocity in the body, in radians a second.
     pub angular_velocity_rad_s: [f64; 3],
+    /// Voltage of the battery, in volts; `None` if it is not played.
+    pub battery_v: Option<f64>,
 }
 
 /// Causes of gaps besides missing rows.
@@ -164,7 +170,10 @@ impl FlightLog {
         let rates_rad_s = source.arrays("angular_velocity", SPEED, &map.angular_velocity);
         let turning = ParameterError::both(attitude, rates_rad_s);
         let motion = ParameterError::both(ParameterError::both(position_m, velocity_m_s), turning);
-        let ((time_s, command), ((position_m, velocity_m_s), (attitude, rates_rad_s))) =
+        let voltage = map.battery_voltage.as_ref();
+        let battery_v = voltage.map(|map| source.arrays("battery_voltage", VOLTAGE, map)).transpose();
+        let motion = ParameterError::both(motion, battery_v);
+        let ((time_s, command), (((position_m, velocity_m_s), (attitude, rates_rad_s)), battery_v)) =
             ParameterError::both(ParameterError::both(time_s, command), motion)?;
         let row = |index: usize| Row {
             time_s: time_s[index],
@@ -173,6 +182,7 @@ impl FlightLog {
             velocity_m_s: velocity_m_s[index],
             attitude: attitude[index],
             angular_velocity_rad_s: rates_rad_s[index],
+            battery_v: battery_v.as_ref().map(|values| values[index][0]),
         };
         Ok(Self { rows: (0..time_s.len()).map(row).collect() })
     }
@@ -242,6 +252,7 @@ impl FlightLog {
                 &after.angular_velocity_rad_s,
                 part,
             ),
+            battery_v: before.battery_v.zip(after.battery_v).map(|(from, to)| from + (to - from) * part),
         }
     }
 }
@@ -380,6 +391,7 @@ mod tests {
                 velocity_m_s: [0.0; 3],
                 attitude: [0.0, 0.0, 0.0, 1.0],
                 angular_velocity_rad_s: [rate, 0.6 * rate, 0.0],
+                battery_v: None,
             }
         };
         FlightLog { rows: (0..1000).map(row).collect() }

@@ -2,7 +2,7 @@
 
 use crate::flight_log::{ColumnMap, FlightLog, Gap, Row};
 use component::context::{NodeContext, StepContext};
-use component::messages::{MeasuredState, MotorCommand, Quaternion};
+use component::messages::{Battery, MeasuredState, MotorCommand, Quaternion};
 use component::{Component, Info, OutputPorts, StepError};
 use diagnostics::parameter::{ParameterError, refuse};
 use inputs::{FileKind, InputFiles};
@@ -84,6 +84,8 @@ pub struct Outputs {
     pub command: MotorCommand,
     /// The measured motion.
     pub measured: MeasuredState,
+    /// The measured voltage of the battery, without current and charge; not valid where the flight has none.
+    pub battery: Option<Battery>,
 }
 
 /// A recorded flight that is played.
@@ -135,7 +137,18 @@ impl Component for Player {
         }
         let row = self.log.at(time_s);
         let command = MotorCommand { command: row.command, ..Default::default() };
-        Ok(Outputs { command, measured: message(&row) })
+        Ok(Outputs { command, measured: message(&row), battery: Some(battery(&row, context.time_ns())) })
+    }
+}
+
+/// The voltage of a row. A battery that flies has one above zero.
+fn battery(row: &Row, measured_ns: u64) -> Battery {
+    let measured = row.battery_v.filter(|voltage| *voltage > 0.0);
+    Battery {
+        measured_ns,
+        voltage: measured.unwrap_or_default(),
+        valid: u32::from(measured.is_some()),
+        ..Default::default()
     }
 }
 

@@ -10,13 +10,14 @@ use crate::clean::gaps;
 use crate::error::FlightsError;
 use crate::flight::{Channel, Flight, period_s};
 use crate::frame::{rotation, to_wxyz};
+use crate::measured_voltage::MeasuredVoltage;
 
-/// The columns of the file of a vehicle with so many `rotors`, as the `columns` table of a player in a
-/// manifest.
+/// The columns of the file of `flight`, as the `columns` table of a player in a manifest.
 #[must_use]
-pub fn columns(rotors: usize) -> String {
-    let command: Vec<String> = (1..=rotors).map(|rotor| format!("\"m{rotor}\"")).collect();
-    format!("command = {{ columns = [{}], unit = \"count\" }}\n{COLUMNS}", command.join(", "))
+pub fn columns(flight: &Flight) -> String {
+    let command: Vec<String> = (1..=flight.rotors).map(|rotor| format!("\"m{rotor}\"")).collect();
+    let voltage = MeasuredVoltage::of(flight).map_or("", |_| VOLTAGE);
+    format!("command = {{ columns = [{}], unit = \"count\" }}\n{COLUMNS}{voltage}", command.join(", "))
 }
 
 const COLUMNS: &str = r#"time = { columns = ["t"], unit = "s" }
@@ -25,6 +26,8 @@ velocity = { columns = ["vx", "vy", "vz"], unit = "m/s" }
 attitude = { columns = ["qx", "qy", "qz", "qw"], unit = "1" }
 angular_velocity = { columns = ["wx", "wy", "wz"], unit = "rad/s" }
 "#;
+
+const VOLTAGE: &str = "battery_voltage = { columns = [\"vbat\"], unit = \"V\" }\n";
 
 /// The start of every such file.
 pub const HEADER_START: &str = "t,m1,";
@@ -66,6 +69,8 @@ pub struct Row {
     pub attitude: [f64; 4],
     /// Angular velocity in B.
     pub angular_velocity_rad_s: [f64; 3],
+    /// Voltage of the battery in V, a mean over 0.2 s; `None` if it was not logged.
+    pub battery_v: Option<f64>,
 }
 
 impl Row {
@@ -78,6 +83,7 @@ impl Row {
             &self.velocity_m_s,
             &self.attitude,
             &self.angular_velocity_rad_s,
+            self.battery_v.as_slice(),
         ]
         .concat();
         numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
@@ -106,7 +112,9 @@ pub fn csv(flight: &Flight) -> Result<(Canonical, String), FlightsError> {
 /// The rows of a vehicle with so many `rotors` as a CSV file.
 pub fn text(rows: &[Row], rotors: usize) -> String {
     let command: String = (1..=rotors).map(|rotor| format!("m{rotor},")).collect();
-    let header = format!("t,{command}px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz\n");
+    // A flight has a voltage in all rows or in none.
+    let voltage = if rows.iter().any(|row| row.battery_v.is_some()) { ",vbat" } else { "" };
+    let header = format!("t,{command}px,py,pz,vx,vy,vz,qx,qy,qz,qw,wx,wy,wz{voltage}\n");
     rows.iter().fold(header, |text, row| text + &row.text(rotors))
 }
 
@@ -139,6 +147,7 @@ struct Table<'a> {
     flight: &'a Flight,
     velocity: Channel<3>,
     angular_velocity: Channel<3>,
+    voltage: Option<MeasuredVoltage>,
     /// Times, without their ends, at which a channel has no samples.
     gaps: Vec<(f64, f64)>,
 }
@@ -170,7 +179,11 @@ impl<'a> Table<'a> {
         let gaps =
             [position, &velocity.time_s, attitude, &angular_velocity.time_s].map(|time_s| without(time_s));
         let gaps = [&gaps.concat()[..], &without_commands(flight)].concat();
-        Self { flight, gaps: joined(gaps), velocity, angular_velocity }
+        let voltage = MeasuredVoltage::of(flight);
+        if voltage.is_some() {
+            notes.push("battery voltage: the mean over 0.2 s about each row".to_owned());
+        }
+        Self { flight, gaps: joined(gaps), velocity, angular_velocity, voltage }
     }
 
     fn is_in_gap(&self, time_s: f64) -> bool {
@@ -187,6 +200,7 @@ impl<'a> Table<'a> {
             velocity_m_s: linear(&self.velocity, time_s),
             attitude: [x, y, z, w],
             angular_velocity_rad_s: linear(&self.angular_velocity, time_s),
+            battery_v: self.voltage.as_ref().map(|voltage| voltage.at(time_s)),
         }
     }
 }

@@ -23,6 +23,7 @@
 //! | `state` | errors of a simulated state against the measured one |
 //! | `canonical` | a flight as one CSV table |
 //! | `known` | stretches in which the commands determine the rotor speeds |
+//! | `measured_voltage` | the voltage of the battery, as it drives the motors |
 //! | `played` | a flight as it is played, and the windows that a replay counts |
 //! | `error` | what can be wrong |
 
@@ -62,6 +63,7 @@ mod log_reader;
 mod logs;
 mod matrices;
 mod mcap_log;
+mod measured_voltage;
 mod name;
 mod number_rows;
 mod opening;
@@ -96,6 +98,7 @@ pub use jumps::{leave_out_jumps, position_jumps};
 pub use known::{KnownRotors, SETTLE_S};
 pub use limits::NextFlight;
 pub use log_reader::ReadFile;
+pub use measured_voltage::MeasuredVoltage;
 pub use played::Played;
 pub use quantity::Quantity;
 pub use rig::{Hold, hold};

@@ -84,6 +84,7 @@ impl Played {
                 &after.angular_velocity_rad_s,
                 part,
             ),
+            battery_v: before.battery_v.zip(after.battery_v).map(|(from, to)| from + (to - from) * part),
         }
     }
 

@@ -229,7 +229,10 @@ pub fn start(problem: &Problem, base: &FitResult, candidate: &Candidate) -> (Vec
     let more = (*candidate.kind == POSE_DELAY).then_some(by_clocks);
     for values in candidate.kind.guesses.iter().copied().chain(more) {
         let mut tried = base.values.clone();
-        candidate.free.iter().zip(values).for_each(|(at, value)| tried[*at] = *value);
+        for at in &candidate.free {
+            let guess = values.get(problem.model.parameters.all[*at].guess());
+            tried[*at] = guess.copied().unwrap_or(tried[*at]);
+        }
         let cost = problem.costs(&problem.estimation, &tried).iter().sum::<f64>();
         // The parts of a product have no slope at zero, so some other start is taken in any case.
         if cost < least || (start == base.values && candidate.free.len() > 1) {

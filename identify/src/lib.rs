@@ -15,6 +15,7 @@
 //! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
 //! | [`steps_ahead`], [`accelerations`] | errors of multi-step predictions; accelerations at every sample, for benchmarks |
 //! | `parameter`, `sensor_effects` | what may be changed of the model; sensors' errors as effects beside the plant's |
+//! | `logged_voltage` | voltages of the battery that flights have logged, and the parameters that they determine |
 //! | `candidate` | which effects these flights can show |
 //! | `flight_wind`, `wind_search`, `wind_start`, `wind_reports`, `past_wind` | one wind for each flight; the search for several; where a fit of it starts; its report; that of a test flight as its past shows it |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
@@ -80,6 +81,7 @@ mod judgement;
 mod lever;
 mod limits;
 mod log_rates;
+mod logged_voltage;
 mod logging;
 mod loss;
 mod memo;

@@ -5,6 +5,7 @@
 //! unexplained.
 
 use crate::flight_wind::FLIGHT_WIND;
+use crate::logged_voltage::LoggedVoltage;
 use crate::sensor_effects::SENSOR_EFFECTS;
 use plant::effects::{CATALOGUE, Effect, EffectKind, ParameterSpec, Randomness, Values, WIND};
 use vehicles::Vehicle;
@@ -43,9 +44,14 @@ impl Parameters {
     /// The parameters of all candidates for `vehicle`, which has the effects `declared`. Parameters without a neutral
     /// value are not fitted: they are those of `declared`, or fit the vehicle's size.
     pub fn of(vehicle: &Vehicle, declared: &[Effect]) -> Self {
+        Self::of_flights(vehicle, declared, &LoggedVoltage::default())
+    }
+
+    /// The same for flights that have logged these voltages of the battery.
+    pub fn of_flights(vehicle: &Vehicle, declared: &[Effect], voltage: &LoggedVoltage) -> Self {
         let as_declared = |kind: &&'static EffectKind| {
             let effect = declared.iter().find(|effect| effect.kind == *kind).copied();
-            effect.unwrap_or_else(|| kind.neutral_for(vehicle))
+            effect.unwrap_or_else(|| voltage.undeclared(kind.neutral_for(vehicle)))
         };
         let baseline: Vec<Effect> = CATALOGUE.iter().map(as_declared).collect();
         let of_sensors = SENSOR_EFFECTS.map(EffectKind::neutral);
@@ -53,6 +59,7 @@ impl Parameters {
         let all = candidates
             .filter(|effect| effect.kind.randomness == Randomness::Deterministic)
             .flat_map(|effect| of_effect(effect, vehicle))
+            .filter(|parameter| voltage.determines(parameter.kind, parameter.index))
             .collect();
         Self { all, baseline, declared: declared.iter().map(|effect| effect.kind).collect() }
     }
@@ -164,6 +171,11 @@ impl Parameter {
     /// Returns its specification, with unit and bounds.
     pub fn spec(&self) -> &'static ParameterSpec {
         &self.kind.parameters[self.index]
+    }
+
+    /// Its place in the guesses of its effect.
+    pub fn guess(&self) -> usize {
+        self.kind.parameters[..self.index].iter().filter(|spec| spec.neutral.is_some()).count()
     }
 
     /// The value within its bounds that is nearest to `wanted`.

@@ -131,6 +131,7 @@ impl Measured {
                 }
             };
             kick(&mut plant);
+            plant.set_measured_voltage(before.battery_v);
             match &self.rotor_speed {
                 None => plant.step(&before.command[..count], tick_s, &[]),
                 Some(speeds) => {
@@ -156,8 +157,8 @@ impl Measured {
                 });
             }
             if at + 1 == windows.len() {
-                // A battery's charge depends on all that was flown before.
-                if plant.battery().is_none() {
+                // A battery's charge depends on all that was flown before; a measured voltage does not need it.
+                if plant.battery().is_none() || before.battery_v.is_some() {
                     let next_s = self.next_window_s(at_s(tick), at_s(tick) - from_s);
                     let next = ((next_s - start_s - SLACK_S) / tick_s).ceil() as usize;
                     if next > last_tick {

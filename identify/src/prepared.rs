@@ -10,7 +10,7 @@ use crate::sensing::SensorErrors;
 use crate::track::{Track, valid_about};
 use crate::unusable::Unusable;
 use crate::window::{NUMEROV, SIMPSON, Window, central_difference, second_difference};
-use flights::{Channel, Flight, KnownRotors, SETTLE_S};
+use flights::{Channel, Flight, KnownRotors, MeasuredVoltage, SETTLE_S};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -164,6 +164,8 @@ pub struct Prepared<'f> {
     pub number: Option<usize>,
     /// True if the vehicle accelerates as it leans, or moves further to the side than any rig allows.
     pub moves_freely: bool,
+    /// The measured voltage of the battery over the whole flight.
+    pub voltage: Option<Arc<MeasuredVoltage>>,
 }
 
 /// Commands farther apart than this many time constants of the motors say nothing on most of the time between them.
@@ -206,6 +208,7 @@ impl<'f> Prepared<'f> {
         let windows = equations.iter().map(|equation| windows(*equation, flight, step_s)).collect();
         let layout = Layout { clock, knots: Vec::new(), equations, windows };
         let (late, distrusted) = (Lateness::default(), [false; ROTORS_MAX]);
+        let voltage = MeasuredVoltage::of(flight).map(Arc::new);
         let mut prepared = Self {
             flight: used,
             layout,
@@ -218,6 +221,7 @@ impl<'f> Prepared<'f> {
             recent_measured: Recent::default(),
             number: None,
             moves_freely,
+            voltage,
         };
         prepared.layout.knots = prepared.knots(propulsion);
         if prepared.layout.knots.len() >= 3 { Ok(prepared) } else { Err(prepared.unusable(propulsion)) }
@@ -253,6 +257,7 @@ impl<'f> Prepared<'f> {
             recent_measured: Recent::default(),
             number: self.number,
             moves_freely: self.moves_freely,
+            voltage: self.voltage.clone(),
         }
     }
 

@@ -12,6 +12,7 @@ use crate::faults::{self, Fault};
 use crate::fit::Problem;
 use crate::horizons::{of_role, predictions};
 use crate::limits::limits;
+use crate::logged_voltage::LoggedVoltage;
 use crate::logging;
 use crate::loss::losses;
 use crate::misfit::misfits;
@@ -314,7 +315,7 @@ fn usable<'f>(
     declared: &[Effect],
     set: &'f FlightSet,
 ) -> (Problem<'f>, Vec<FlightReport>, Vec<(&'f Flight, String)>) {
-    let parameters = Parameters::of(vehicle, declared);
+    let parameters = Parameters::of_flights(vehicle, declared, &LoggedVoltage::of(&set.flights));
     let propulsion = Propulsion::of(vehicle);
     let (mut estimation, mut validation, mut test) = (Vec::new(), Vec::new(), Vec::new());
     let (mut reports, mut reasons) = (Vec::new(), Vec::new());

@@ -1,6 +1,7 @@
 //! Rotors that follow from the commands: motors simulated in fine steps along a flight.
 
 use crate::prepared::{Held, Prepared};
+use flights::MeasuredVoltage;
 use nalgebra::Vector3;
 use plant::{Airframe, AirframeState, PerRotor, RigidBody, RotorState, State};
 
@@ -31,6 +32,8 @@ pub fn spun(airframe: &Airframe, flight: &Prepared, pose_s: f64) -> Vec<PerRotor
 struct Spinning<'s> {
     airframe: &'s Airframe,
     commands: Held<'s>,
+    /// The measured voltage that the motors follow.
+    voltage: Option<&'s MeasuredVoltage>,
     is_slow: bool,
     memory: AirframeState,
     state: State,
@@ -44,12 +47,15 @@ impl<'s> Spinning<'s> {
     /// Motors that have settled at `start_s`.
     fn new(airframe: &'s Airframe, flight: &'s Prepared, start_s: f64, step_s: f64) -> Self {
         let rotors = PerRotor::filled(airframe.vehicle().rotors.len(), RotorState::default());
+        let memory = airframe.initial_state(0, "identify", step_s);
+        let state = State { body: RigidBody::level_at(Vector3::zeros()), rotors };
         let mut spinning = Self {
             airframe,
             commands: Held::new(&flight.flight.command),
+            voltage: flight.voltage.as_deref().filter(|_| airframe.battery(&memory, &state).is_some()),
             is_slow: flight.slow_period_s.is_some(),
-            memory: airframe.initial_state(0, "identify", step_s),
-            state: State { body: RigidBody::level_at(Vector3::zeros()), rotors },
+            memory,
+            state,
             step_s,
             piece_s: start_s,
             steps: 0,
@@ -65,9 +71,9 @@ impl<'s> Spinning<'s> {
     }
 
     /// Goes on with the piece that begins at `to_s`. A battery's charge depends on all that was flown before: it is discharged by motors that follow at
-    /// once, in longer steps.
+    /// once, in longer steps. A measured voltage needs no charge.
     fn leave_out(&mut self, to_s: f64) {
-        if self.airframe.battery(&self.memory, &self.state).is_some() {
+        if self.voltage.is_none() && self.airframe.battery(&self.memory, &self.state).is_some() {
             let from_s = self.piece_s + self.steps as f64 * self.step_s;
             let steps = ((to_s - from_s) / LEFT_OUT_S).ceil().max(1.0) as usize;
             let step_s = (to_s - from_s) / steps as f64;
@@ -111,6 +117,8 @@ impl<'s> Spinning<'s> {
             self.commands.mean(from_s, to_s)
         };
         let command = &command[..self.state.rotors.len()];
+        let voltage = self.voltage.map(|voltage| voltage.at(f64::midpoint(from_s, to_s)));
+        self.memory.measured_voltage_V = voltage;
         let actuation = self.airframe.begin_tick(&mut self.memory, &self.state, command, self.step_s);
         self.state.rotors = self.airframe.spun(actuation, &self.state.rotors, self.step_s);
     }

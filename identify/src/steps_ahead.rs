@@ -213,6 +213,7 @@ pub(crate) fn rotor_speeds(
         speeds.time_s.push(time_s);
         speeds.values.push(now);
         plant.set_body(&body(&row));
+        plant.set_measured_voltage(row.battery_v);
         plant.step(&row.command[..count], MOTOR_STEP_S, &[]);
     }
     Ok(speeds)

@@ -93,6 +93,9 @@ fn envelope(report: &Report) -> Table {
 /// Source of a value that is nominal for a vehicle of this size, not for the Hummingbird.
 const SCALED: &str = "typical of a vehicle of this size (`scale_to` of the effect)";
 
+/// Source of the full voltage where the exponent was fitted to a measured one.
+const FULL: &str = "a full battery of as many lithium-polymer cells as the greatest logged voltage takes";
+
 #[allow(clippy::float_cmp, reason = "a value that was not touched is the same")]
 fn table(effect: &Effect, vehicle: &Vehicle, report: &Report) -> Table {
     let name = effect.kind.name;
@@ -105,6 +108,10 @@ fn table(effect: &Effect, vehicle: &Vehicle, report: &Report) -> Table {
         let estimate = fitted.and_then(|effect| effect.parameters.get(spec.name));
         let declared =
             stated.and_then(|effect| effect.parameters.iter().find(|effect| effect.name == spec.name));
+        let is_full = effect.kind.voltage_law.is_some_and(|law| {
+            let exponent = effect.kind.parameters[law.exponent].name;
+            law.nominal == index && fitted.is_some_and(|effect| effect.parameters.contains_key(exponent))
+        });
         table[spec.name] = match (estimate, declared) {
             (Some(estimate), _) => of_estimate(estimate, &source(report)),
             (None, Some(declared)) => {
@@ -114,7 +121,13 @@ fn table(effect: &Effect, vehicle: &Vehicle, report: &Report) -> Table {
             (None, None) => parameter(
                 value,
                 spec.unit(),
-                if value == spec.nominal { spec.nominal_source } else { SCALED },
+                if is_full {
+                    FULL
+                } else if value == spec.nominal {
+                    spec.nominal_source
+                } else {
+                    SCALED
+                },
                 "not identified: held while the others were fitted".into(),
             ),
         };

@@ -5,6 +5,7 @@ mod simulated;
 mod skipped;
 
 mod attribution;
+mod battery;
 mod clocks;
 mod commands;
 mod coverage;

@@ -131,6 +131,7 @@ impl Airframe {
         let state = |kind: &str| EffectState::new(kind, random(kind), self.vehicle.rotors.len());
         AirframeState {
             actuation: Actuation::none(self.vehicle.rotors.len()),
+            measured_voltage_V: None,
             commands: DelayLine::new(self.delay_s() / dt_s, self.vehicle.rotors.len()),
             effects: self.kinds().map(state).collect(),
         }
@@ -145,7 +146,8 @@ impl Airframe {
         commands: &[f64],
         dt_s: f64,
     ) -> &'m Actuation {
-        let AirframeState { actuation, commands: line, effects } = memory;
+        let AirframeState { actuation, measured_voltage_V, commands: line, effects } = memory;
+        let measured_voltage_V = *measured_voltage_V;
         let delayed = line.pass(commands, self.delay_s() / dt_s);
         actuation.ask(self.targets_rad_s(&delayed));
         for (effect, effect_state) in self.effects.iter().zip(effects) {
@@ -153,25 +155,30 @@ impl Airframe {
                 if let Action::Tick(tick) = action {
                     let condition = FlightCondition::new(&self.vehicle, state, &actuation.air_velocity_W_m_s);
                     let (actuation, state) = (&mut *actuation, &mut *effect_state);
-                    tick(&effect.values, &mut Advance { condition, actuation, state, dt_s });
+                    tick(
+                        &effect.values,
+                        &mut Advance { condition, actuation, state, measured_voltage_V, dt_s },
+                    );
                 }
             }
         }
         actuation
     }
 
-    /// The battery, if an effect models it.
+    /// The battery, if an effect models it: with the voltage that was measured, if there is one.
     #[must_use]
     pub fn battery(&self, effects: &AirframeState, state: &State) -> Option<Battery> {
         let speeds_rad_s = state.rotors.map(|rotor| rotor.speed_rad_s);
-        self.effects.iter().zip(&effects.effects).find_map(|(effect, effect_state)| {
+        let modelled = self.effects.iter().zip(&effects.effects).find_map(|(effect, effect_state)| {
             effect.kind.actions.iter().find_map(|action| match action {
                 Action::Battery(battery) => {
                     Some(battery(&effect.values, effect_state, &self.vehicle, &speeds_rad_s))
                 }
                 _ => None,
             })
-        })
+        })?;
+        let voltage_V = effects.measured_voltage_V.unwrap_or(modelled.voltage_V);
+        Some(Battery { voltage_V, ..modelled })
     }
 
     /// Returns the actuation under `commands` in still air, without the state of effects.

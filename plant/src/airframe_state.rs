@@ -14,6 +14,9 @@ use component::random::{Stream, normal};
 pub struct AirframeState {
     /// Actuation over the tick that began last.
     pub actuation: Actuation,
+    /// Voltage of the battery over the tick that begins next, if it is measured: the motors then follow it in place of the model's. It is an input
+    /// from outside, set before each tick, and not written down.
+    pub measured_voltage_V: Option<f64>,
     pub(crate) commands: DelayLine,
     /// One for each effect, in their order.
     pub(crate) effects: Vec<EffectState>,

@@ -28,6 +28,9 @@ pub trait Backend: Send {
     /// Has the rotors turn steadily at raw motor `commands`.
     fn settle_rotors(&mut self, commands: &[f64]);
 
+    /// Has the motors follow a measured voltage of the battery in the ticks from now on, in place of the model's; `None` is that of the model.
+    fn set_measured_voltage(&mut self, voltage_V: Option<f64>);
+
     /// Puts the body where it is said to be; the rotors stay as they are.
     fn set_body(&mut self, body: &RigidBody);
 

@@ -314,6 +314,10 @@ impl Backend for Rapier {
         self.lean_on_support();
     }
 
+    fn set_measured_voltage(&mut self, voltage_V: Option<f64>) {
+        self.effects.measured_voltage_V = voltage_V;
+    }
+
     fn set_body(&mut self, body: &RigidBody) {
         let before = self.motion.system.state.body;
         self.motion.system.state.body = *body;

@@ -40,5 +40,5 @@ pub use catalogue::{CATALOGUE, find};
 pub use condition::FlightCondition;
 pub use kind::{
     Action, Advance, Confounder, Effect, EffectKind, FitAs, PARAMETERS_MAX, ParameterSpec, Quantity,
-    Randomness, Requirement, Stage, Values,
+    Randomness, Requirement, Stage, Values, VoltageLaw,
 };

@@ -80,6 +80,10 @@ impl Backend for FreeFlight {
         self.state.rotors = self.model.steady_each(commands);
     }
 
+    fn set_measured_voltage(&mut self, voltage_V: Option<f64>) {
+        self.effects.measured_voltage_V = voltage_V;
+    }
+
     fn set_body(&mut self, body: &RigidBody) {
         self.state.body = *body;
     }

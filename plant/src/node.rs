@@ -13,7 +13,7 @@ use crate::parameters::{Parameters, unequal};
 use crate::state::RigidBody;
 use component::context::{NodeContext, StepContext};
 use component::messages::{
-    self, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame,
+    self, Battery, FRAME_BYTES_MAX, FrameName, MeasuredState, MotorCommand, Traffic, body_frame,
 };
 use component::{Component, Info, InputPorts, StepError};
 use diagnostics::ParameterError;
@@ -26,6 +26,8 @@ pub struct Inputs<'a> {
     pub command: &'a MotorCommand,
     /// A measured flight, to whose state the vehicle is set at the start of each window.
     pub measured: Option<&'a MeasuredState>,
+    /// A measured battery, whose voltage the motors follow in place of that of the effect `battery-sag`.
+    pub battery: Option<&'a Battery>,
     /// The vehicles that share the room, this one among them.
     pub traffic: Option<&'a Traffic>,
 }
@@ -40,7 +42,7 @@ pub struct Inputs<'a> {
 /// let parameters = serde_json::json!({ "vehicle": vehicle, "initial_position_m": [0.0, 0.0, 1.0] });
 /// let mut plant = component::Harness::<Plant>::from_json(&parameters).unwrap();
 /// let command = MotorCommand { command: [0.0; 4].into(), ..MotorCommand::default() };
-/// let inputs = || Inputs { command: &command, measured: None, traffic: None };
+/// let inputs = || Inputs { command: &command, measured: None, battery: None, traffic: None };
 /// let state = (0..=100).map(|_| plant.step(inputs()).unwrap().state).last().unwrap();
 /// assert!(state.position.z < 1.0 && state.velocity.z < 0.0, "with its rotors off it falls: {state:?}");
 /// ```
@@ -148,6 +150,8 @@ impl Plant {
             Err(OthersError::Absent { .. }) if number > 1 => None,
             seen => seen?,
         };
+        let measured = inputs.battery.filter(|battery| battery.valid == 1 && battery.voltage > 0.0);
+        backend.set_measured_voltage(measured.map(|battery| battery.voltage));
         backend.step(&inputs.command.command, self.dt_s, seen.unwrap_or_default());
         Ok(())
     }
@@ -292,7 +296,7 @@ mod tests {
         let parameters = json!({ "vehicle": repository("vehicles/hummingbird.toml") });
         let step = |command: &[f64]| {
             let command = MotorCommand { command: command.iter().copied().collect(), ..Default::default() };
-            let inputs = Inputs { command: &command, measured: None, traffic: None };
+            let inputs = Inputs { command: &command, measured: None, battery: None, traffic: None };
             let mut plant = component::Harness::<Plant>::from_json(&parameters).unwrap();
             plant.step(inputs).map(|outputs| outputs.state.rotor_speed.len())
         };

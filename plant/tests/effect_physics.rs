@@ -234,6 +234,46 @@ fn a_battery_that_cannot_give_the_power_gives_what_it_can() {
     assert!(Flight::hovering(Vec::new()).model.airframe().battery(&flight.effects, &flight.state).is_none());
 }
 
+/// The speed follows the measured voltage by its power, and not that of the model.
+#[test]
+fn a_measured_voltage_takes_the_place_of_the_models() {
+    let declared = hummingbird();
+    let (hover, hover_rad_s) = (declared.hover_command(), declared.hover_speed_rad_s());
+    // R, D, q_0, U_0, C, eta, p.
+    let targets = |exponent: f64, measured_V: Option<f64>| {
+        let sagging = effect("battery-sag", &[0.05, 2.0, 0.9, 12.6, 7560.0, 0.7, exponent]);
+        let mut flight = Flight::hovering(vec![sagging]);
+        flight.effects.measured_voltage_V = measured_V;
+        flight.fly(hover, 1);
+        let battery = flight.model.airframe().battery(&flight.effects, &flight.state).unwrap();
+        (flight.effects.actuation.targets_rad_s[0], battery.voltage_V)
+    };
+    for (exponent, factor) in [(0.0, 1.0), (0.5, 0.5_f64.sqrt()), (1.0, 0.5), (2.0, 0.25)] {
+        let (target_rad_s, voltage_V) = targets(exponent, Some(6.3));
+        assert!((target_rad_s - factor * hover_rad_s).abs() < 1e-9, "{exponent}: {target_rad_s}");
+        assert_eq!(voltage_V, 6.3);
+    }
+    let (modelled_rad_s, voltage_V) = targets(2.0, None);
+    assert!((10.0..11.0).contains(&voltage_V), "{voltage_V}");
+    let factor = modelled_rad_s / hover_rad_s;
+    assert!((factor.sqrt() - voltage_V / 12.6).abs() < 1e-3, "{factor}");
+}
+
+#[test]
+fn the_full_battery_has_as_many_cells_as_its_greatest_voltage_takes() {
+    let law = find("battery-sag").unwrap().voltage_law.unwrap();
+    let parameters = find("battery-sag").unwrap().parameters;
+    assert_eq!(
+        (parameters[law.exponent].name, parameters[law.nominal].name),
+        ("exponent", "nominal_voltage")
+    );
+    for (greatest_V, full_V) in
+        [(3.6, 4.2), (4.25, 4.2), (8.3, 8.4), (11.1, 12.6), (12.6, 12.6), (16.2, 16.8)]
+    {
+        assert!(((law.full_V)(greatest_V) - full_V).abs() < 1e-9, "{greatest_V}");
+    }
+}
+
 #[test]
 fn a_vehicle_hung_below_its_bearing_swings_with_the_pendulums_period() {
     let (moment_kg_m, added_kg_m2) = (0.02, 1e-3);

@@ -30,7 +30,12 @@ fn plant(parameters: &Value, ports: &[&str]) -> Harness<Plant> {
 /// Requires that a transfer leaves no trace, and returns the number of contacts that began before it and in all.
 fn require_transfer(parameters: &Value) -> [u32; 2] {
     let commands = commands();
-    let inputs = |tick: u32| Inputs { command: &commands[tick as usize], measured: None, traffic: None };
+    let inputs = |tick: u32| Inputs {
+        command: &commands[tick as usize],
+        measured: None,
+        battery: None,
+        traffic: None,
+    };
     Harness::require_transfer(|| plant(parameters, &["command"]), inputs);
     let mut flown = plant(parameters, &["command"]);
     let began: Vec<u32> =
@@ -93,7 +98,8 @@ fn a_vehicle_among_others_knows_its_place_after_a_transfer() {
     let fly = |harness: &mut Harness<Plant>, last: &mut PlantState| {
         let seen = traffic(last, harness.tick);
         let command = &commands[harness.tick as usize];
-        let sent = harness.step(Inputs { command, measured: None, traffic: Some(&seen) }).unwrap();
+        let sent =
+            harness.step(Inputs { command, measured: None, battery: None, traffic: Some(&seen) }).unwrap();
         *last = sent.state;
         sent.contact.unwrap()
     };
@@ -144,7 +150,7 @@ fn a_vehicle_with_other_effects_adopts_a_state() {
         };
         let (mut flown, mut drag) = (with("hummingbird.toml"), with("hummingbird-drag.toml"));
         for command in &commands[..500] {
-            flown.step(Inputs { command, measured: None, traffic: None }).unwrap();
+            flown.step(Inputs { command, measured: None, battery: None, traffic: None }).unwrap();
         }
         let state = flown.saved();
         assert!(drag.state.load(&state).is_err());
@@ -183,7 +189,12 @@ fn a_configuration_has_a_number_of_its_own() {
 #[test]
 fn a_plant_that_cannot_load_the_state_does_not_take_over() {
     let commands = commands();
-    let inputs = |tick: u32| Inputs { command: &commands[tick as usize], measured: None, traffic: None };
+    let inputs = |tick: u32| Inputs {
+        command: &commands[tick as usize],
+        measured: None,
+        battery: None,
+        traffic: None,
+    };
     let mut first = plant(&json!({ "initial_position_m": [0.0, 0.0, 1.0] }), &[]);
     let last = (0..500).map(|tick| first.step(inputs(tick)).unwrap()).last();
     let mut second = plant(&json!({ "backend": "rapier" }), &[]);

@@ -20,6 +20,8 @@ pub mod rigs;
 const TICK_S: f64 = 0.001;
 /// A vehicle further away than this has got out of control: its flight does not compare with any other.
 const FAR_M: f64 = 12.0;
+/// Ticks from one sample of the battery's voltage to the next.
+const VOLTAGE_TICKS: usize = 20;
 /// Over this time a course comes up to speed.
 const RUN_UP_S: f64 = 3.0;
 
@@ -34,6 +36,8 @@ pub struct Sensors {
     pub imu_ticks: usize,
     /// True if the rotors' speeds are logged.
     pub has_rotor_speeds: bool,
+    /// True if the voltage of the battery is logged, of a truth that has one.
+    pub has_voltage: bool,
     /// Delay of the pose's stamps.
     pub pose_delay_s: f64,
     /// Bias of the accelerometer.
@@ -49,6 +53,7 @@ impl Default for Sensors {
             pose_ticks: 5,
             imu_ticks: 1,
             has_rotor_speeds: false,
+            has_voltage: false,
             pose_delay_s: 0.0,
             accelerometer_bias_m_s2: [0.0; 3],
             gyroscope_bias_rad_s: [0.0; 3],
@@ -390,6 +395,11 @@ impl Log {
                 rotor.speed_rad_s + self.sensors.noise * normal
             });
             push(&mut self.flight.rotor_speed, time_s, padded(&speeds));
+        }
+        if self.sensors.has_voltage && tick.is_multiple_of(VOLTAGE_TICKS) {
+            let battery = plant.battery().expect("a truth with a battery");
+            let [voltage_V, _, _] = self.noisy([battery.voltage_V, 0.0, 0.0], 0.02);
+            push(&mut self.flight.battery_voltage, time_s, [voltage_V]);
         }
     }
 

@@ -49,7 +49,7 @@ pub struct EffectKind {
     pub changes_drive: bool,
     /// True if equations linearised about the neutral values predict what it can explain.
     pub is_linear: bool,
-    /// Initial guesses of a fit, each a value for each fitted parameter. If there are none, it starts at the
+    /// Initial guesses of a fit, each a value for each parameter that has a neutral one. If there are none, it starts at the
     /// neutral values.
     pub guesses: &'static [&'static [f64]],
     /// Fits nominal values, which are a Hummingbird's, to a vehicle of another size.
@@ -57,6 +57,8 @@ pub struct EffectKind {
     /// Greatest plausible value of each parameter for a vehicle, where that depends on its size. A fit goes no further; a file may state
     /// more, up to the bound.
     pub plausible_max: Option<fn(&Vehicle) -> f64>,
+    /// Law by which the rotors follow the voltage of the battery, where that is measured.
+    pub voltage_law: Option<VoltageLaw>,
     /// Effects that look like it, and how to tell them apart. Each pair stands with one of the two.
     pub confounded_with: &'static [Confounder],
     /// Requirement on the vehicle that it acts on, if it has one.
@@ -65,6 +67,17 @@ pub struct EffectKind {
     pub moves_air: bool,
     /// True if its parameters are one for each rotor: those behind the vehicle's last rotor have to be neutral.
     pub is_per_rotor: bool,
+}
+
+/// Law by which the rotors follow a measured voltage of the battery, by parameters of its effect.
+#[derive(Debug, Clone, Copy)]
+pub struct VoltageLaw {
+    /// Place of the exponent among the parameters. At 0 a measured voltage changes nothing.
+    pub exponent: usize,
+    /// Place of the voltage at which the declared command map holds.
+    pub nominal: usize,
+    /// That voltage for a battery of which this one is the greatest measured, where no file declares it.
+    pub full_V: fn(f64) -> f64,
 }
 
 /// A condition on the vehicle that an effect acts on; the error describes it in words.
@@ -119,6 +132,8 @@ pub struct Advance<'a> {
     pub actuation: &'a mut Actuation,
     /// State that the effect carries from tick to tick.
     pub state: &'a mut EffectState,
+    /// Voltage at the terminals of the battery, if it is measured.
+    pub measured_voltage_V: Option<f64>,
     /// Length of the tick.
     pub dt_s: f64,
 }
@@ -291,6 +306,7 @@ impl EffectKind {
         guesses: &[],
         scale_to: None,
         plausible_max: None,
+        voltage_law: None,
         confounded_with: &[],
         require: None,
         moves_air: false,

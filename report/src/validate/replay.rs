@@ -4,7 +4,7 @@
 //! commands, set to the measured state at the start of each window; all in one run, so that all fly the same.
 
 use anyhow::{Context, Result, bail};
-use flights::{Flight, Played};
+use flights::{Flight, MeasuredVoltage, Played};
 use inputs::InputFiles;
 use recorder::reader::Recording;
 use runtime::event::{RunEvent, StopToken};
@@ -22,6 +22,9 @@ pub const HORIZONS_MS: [u32; 3] = [100, 500, 1000];
 
 /// The topic of the measured states.
 pub const MEASURED: &str = "/player/measured";
+
+/// The topic of the measured voltage of the battery.
+const BATTERY: &str = "/player/battery";
 
 /// Ticks a second.
 const RATE_HZ: u32 = 1000;
@@ -77,7 +80,7 @@ impl Replay {
         let (start_s, end_s) = played.span_s();
         let ticks = ticks(end_s - start_s)?;
         let initial = command_at(flight, start_s).context("it has no motor commands")?;
-        let manifest = manifest(ticks, &flights::columns(flight.rotors), &initial, vehicles)?;
+        let manifest = manifest(ticks, flight, &initial, vehicles)?;
         // For a user who keeps the folder, and flies it once more.
         output_file::write(&folder.join(MANIFEST), &WRITTEN, |out| {
             write!(out, "{MANIFEST_START}\n\n{manifest}")
@@ -133,9 +136,10 @@ impl Replay {
     }
 }
 
-/// The manifest of a run of `ticks` ticks, with the column map `columns` and the command `initial` before the first.
-fn manifest(ticks: u32, columns: &str, initial: &[f64], vehicles: &[&Path]) -> Result<ManifestBuilder> {
+/// The manifest of a run of `ticks` ticks of `flight`, with the command `initial` before the first.
+fn manifest(ticks: u32, flight: &Flight, initial: &[f64], vehicles: &[&Path]) -> Result<ManifestBuilder> {
     let every = i64::from(RECORDED_TICKS);
+    let has_voltage = MeasuredVoltage::of(flight).is_some();
     let mut manifest = ManifestBuilder::new()
         .set("run.rate_hz", i64::from(RATE_HZ))
         .set("run.duration_s", f64::from(ticks) / f64::from(RATE_HZ))
@@ -145,8 +149,11 @@ fn manifest(ticks: u32, columns: &str, initial: &[f64], vehicles: &[&Path]) -> R
         .set("process.player.outputs.measured.every_ticks", every)
         // Windows that touch a gap do not count.
         .set("process.player.parameters.gaps", "hold")
-        .set("process.player.parameters.columns", columns.parse::<toml::Table>()?)
+        .set("process.player.parameters.columns", flights::columns(flight).parse::<toml::Table>()?)
         .set("process.recorder.kind", "recorder");
+    if has_voltage {
+        manifest = manifest.set("process.player.outputs.battery.every_ticks", 1);
+    }
     for (number, vehicle) in vehicles.iter().enumerate() {
         let path = std::path::absolute(vehicle)?;
         let vehicle = path.to_str().with_context(|| {
@@ -154,7 +161,7 @@ fn manifest(ticks: u32, columns: &str, initial: &[f64], vehicles: &[&Path]) -> R
         })?;
         for horizon_ms in HORIZONS_MS {
             let plant = format!("process.{}", plant(number, horizon_ms));
-            let command = format!("{plant}.inputs.command");
+            let [command, battery] = ["command", "battery"].map(|port| format!("{plant}.inputs.{port}"));
             manifest = manifest
                 .set(&format!("{plant}.kind"), "plant")
                 .set(&format!("{plant}.vehicle"), vehicle)
@@ -164,6 +171,12 @@ fn manifest(ticks: u32, columns: &str, initial: &[f64], vehicles: &[&Path]) -> R
                 .set(&format!("{command}.initial.command"), initial.to_vec())
                 .set(&format!("{plant}.inputs.measured"), MEASURED)
                 .set(&format!("{plant}.outputs.state.every_ticks"), every);
+            if has_voltage {
+                manifest = manifest
+                    .set(&format!("{battery}.topic"), BATTERY)
+                    .set(&format!("{battery}.delay_ticks"), 1)
+                    .set(&format!("{battery}.initial.valid"), 0);
+            }
         }
     }
     Ok(manifest)

@@ -3,7 +3,7 @@
 use super::{mass_error, thrust_scale};
 use crate::actuation::Battery;
 use crate::airframe_state::EffectState;
-use crate::effects::kind::{Action, Advance, Confounder, EffectKind, Quantity, Stage, Values};
+use crate::effects::kind::{Action, Advance, Confounder, EffectKind, Quantity, Stage, Values, VoltageLaw};
 use crate::rotor;
 use diagnostics::unit::{CHARGE, RATIO, RESISTANCE, VOLTAGE};
 use vehicles::Vehicle;
@@ -12,20 +12,21 @@ pub static EFFECT: EffectKind = EffectKind {
     name: "battery-sag",
     summary: "the battery's voltage falls with its charge and under load, and the commanded rotor speed \
               falls with it",
-    equation: "w_target U / U_0 with U = U_0 - D (1 - q) - R I, U I = sum c_Q |w_i|^3 / eta, \
-               q = 1 - q_0 - (charge drawn) / C",
+    equation: "w_target (U / U_0)^p with U = U_0 - D (1 - q) - R I, U I = sum c_Q |w_i|^3 / eta, \
+               q = 1 - q_0 - (charge drawn) / C; a measured voltage takes the place of U",
     source: "equivalent circuit of a voltage and a resistance: Plett, Battery Management Systems I, 2015, chapter 2; a brushed or \
              open-loop motor's speed follows its voltage. The charge's line from full to empty is own",
     validity: "the range between a full and an empty battery in which the discharge curve is near a line. \
-               No recovery after load. A controller of rotor speed holds the speed until its headroom is \
-               gone, and needs no sag",
+               No recovery after load. A controller of rotor speed, or a firmware that raises the command as \
+               the voltage falls, holds the speed until its headroom is gone: p = 0",
     parameters: Parameters::SPECS,
     actions: &[Action::Tick(sag), Action::Battery(battery)],
     needs: &[Quantity::Command],
     stage: Stage::Rotors,
     is_linear: false,
-    guesses: &[&[0.03, 1.0, 0.1], &[0.1, 1.0, 0.3], &[0.01, 0.5, 0.5]],
+    guesses: &[&[0.03, 1.0, 0.1, 1.0], &[0.1, 1.0, 0.3, 1.0], &[0.01, 0.5, 0.5, 1.0]],
     scale_to: Some(scale_to),
+    voltage_law: Some(VoltageLaw { exponent: 6, nominal: 3, full_V }),
     confounded_with: &[
         Confounder { effect: &thrust_scale::EFFECT, experiment: DISCHARGE },
         Confounder { effect: &mass_error::EFFECT, experiment: DISCHARGE },
@@ -51,6 +52,9 @@ effect_parameters! {
             source: "Hummingbird: 2100 mAh, thesis Table 2.1";
         /// eta: power on the rotor shafts by power from the battery
         efficiency: RATIO, min: 0.1, max: 1.0, neutral: None, nominal: 0.7, source: "tuned, no source";
+        /// p: about 1 where nothing corrects the motors for the voltage, 0 where the drive holds their speeds
+        exponent: RATIO, min: -0.5, max: 2.0, neutral: Some(1.0), nominal: 1.0,
+            source: "the speed of a direct-current motor without load is proportional to its voltage";
     }
 }
 
@@ -65,12 +69,29 @@ fn scale_to(vehicle: &Vehicle, values: &mut Values) {
     }
 }
 
+/// Voltage of a full cell, and the most that one cell is charged to (high-voltage lithium-polymer).
+const CELL_FULL_V: f64 = 4.2;
+const CELL_MOST_V: f64 = 4.35;
+
+/// Open-circuit voltage of a full battery of lithium-polymer cells of which `greatest_V` was measured: it has as many cells as that takes.
+fn full_V(greatest_V: f64) -> f64 {
+    CELL_FULL_V * (greatest_V / CELL_MOST_V).ceil().max(1.0)
+}
+
 fn sag(values: &Values, advance: &mut Advance) {
     let condition = &advance.condition;
     let battery = battery(values, advance.state, condition.vehicle, &condition.rotor_speeds_rad_s);
     advance.state.numbers[0] += battery.current_A * advance.dt_s;
-    let share = battery.voltage_V / Parameters::from(values).nominal_voltage;
-    advance.actuation.targets_rad_s = advance.actuation.targets_rad_s.map(|target| target * share);
+    let Parameters { nominal_voltage, exponent, .. } = values.into();
+    let share = advance.measured_voltage_V.unwrap_or(battery.voltage_V) / nominal_voltage;
+    let factor = power(share, exponent);
+    advance.actuation.targets_rad_s = advance.actuation.targets_rad_s.map(|target| target * factor);
+}
+
+/// `share` to the power of `exponent`. A proportional speed is not rounded, and a battery without voltage turns no motor.
+#[allow(clippy::float_cmp, reason = "a stated exponent of 1 is 1")]
+fn power(share: f64, exponent: f64) -> f64 {
+    if exponent == 1.0 || share <= 0.0 { share } else { libm::pow(share, exponent) }
 }
 
 /// The battery when the charge drawn since the start is the first of the effect's numbers, in coulomb.
