@@ -275,8 +275,10 @@ def truth_of(vehicle, effects):
 def comparable(effects):
     """The parameters whose intervals can be judged."""
     judged = {name: {key: value for key, value in values.items() if key not in NOT_OURS} for name, values in effects.items()}
-    if effects.get("battery-sag", {}).get("curve"):
-        judged["battery-sag"] = {}
+    if "battery-sag" in effects:
+        # The motors follow the voltage; where that was logged, this is all there is to find.
+        charge = {} if effects["battery-sag"].get("curve") else judged["battery-sag"]
+        judged["battery-sag"] = charge | {"exponent": 1.0}
     return judged
 
 
