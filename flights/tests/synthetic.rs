@@ -311,7 +311,7 @@ fn the_canonical_file_derives_what_was_not_logged() {
     let written = flights::write_csv(&flight, &path).unwrap();
     assert_eq!((written.rows, written.notes.len()), (1001, 2), "{:?}", written.notes);
     // Its own column map reads it again.
-    let again = place.load("flight.csv", &format!("\n{}", flights::columns(4)), "").unwrap();
+    let again = place.load("flight.csv", &format!("\n{}", flights::columns(&flight)), "").unwrap();
     for (a, b) in again.velocity.values.iter().zip(&whole.velocity.values) {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3), "{a:?} {b:?}");
     }
