@@ -49,8 +49,9 @@ impl TakeOvers {
     /// Those of the run in `run_dir`, which flies `plan`, up to now.
     pub fn look(&mut self, run_dir: &Path, plan: &Plan, control: &LiveView) -> Vec<TakeOver> {
         let epoch = control.epoch();
-        if self.epoch != Some(epoch)
-            // A membership that has gone meanwhile has a successor, which the next look finds.
+        // The supervisor writes a take-over that has happened into the membership that arranged it. A membership that has gone meanwhile has a
+        // successor, which the next look finds.
+        if (self.epoch != Some(epoch) || !self.arranged.is_empty())
             && let Ok(membership) = Membership::load(run_dir, epoch)
         {
             self.epoch = Some(epoch);
@@ -65,15 +66,16 @@ impl TakeOvers {
     /// Takes the processes of node `number`, called `name`; `times_s` are now and the length of a tick.
     fn take(&mut self, number: usize, name: &str, processes: &Processes, times_s: (f64, f64)) {
         let generation = processes.generation;
+        let arranged = match processes.arranged {
+            Some(arranged) => self.arranged.insert(number, arranged),
+            None => self.arranged.remove(&number),
+        };
         let before = self.generations.insert(number, generation);
         if before.is_some_and(|before| before < generation) {
-            let arranged = self.arranged.remove(&number).filter(|(backup, _)| *backup == generation);
+            let arranged = arranged.filter(|(backup, _)| *backup == generation);
             // A take-over that was arranged and done between two looks has the time at which it was found.
             let time_s = arranged.map_or(times_s.0, |(_, tick)| f64::from(tick) * times_s.1);
             self.seen.push(TakeOver { process: name.to_owned(), generation, time_s });
-        }
-        if let Some(arranged) = processes.arranged {
-            self.arranged.insert(number, arranged);
         }
     }
 }
@@ -97,5 +99,8 @@ mod tests {
         assert_eq!(look(0, "pid", 1, None, 0.3), [seen("pid", 1, 0.25)]);
         assert_eq!(look(0, "pid", 1, None, 0.4).len(), 1);
         assert_eq!(look(1, "ekf", 3, None, 0.5), [seen("pid", 1, 0.25), seen("ekf", 3, 0.5)]);
+        assert_eq!(look(0, "pid", 1, Some((2, 650)), 0.6).len(), 2);
+        assert_eq!(look(0, "pid", 1, None, 0.7).len(), 2, "the backup was withdrawn");
+        assert!(take_overs.arranged.is_empty());
     }
 }
