@@ -143,7 +143,7 @@ fn a_page_is_counted_while_its_stream_is_open() {
         write!(stream, "GET {page}api/events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
         let mut lines = BufReader::new(stream).lines();
         let event = await_some(|| lines.next()?.ok()?.strip_prefix("data: ").map(str::to_owned));
-        assert_eq!(event, r#"{"run":null,"recordings":1,"starts":0}"#);
+        assert_eq!(event, r#"{"run":null,"take_overs":[],"recordings":1,"starts":0}"#);
         lines
     };
     let first = open();
