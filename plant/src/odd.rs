@@ -177,7 +177,7 @@ mod tests {
         }
     }
 
-    /// Of four rotors and of six.
+    /// Vehicles of four and of six rotors.
     #[test]
     fn what_is_odd_is_told_with_its_line() {
         type Change = fn(&mut Vehicle);

@@ -33,7 +33,7 @@ struct Pivot {
 }
 
 impl Pivot {
-    /// Of a box of this length along the way that it tips, and of this height.
+    /// A box of this length along the way that it tips, and of this height.
     fn of(length_m: f64, height_m: f64, ahead_m: f64) -> Self {
         let above_m = height_m / 2.0;
         let about_centre_m2 = (length_m * length_m + height_m * height_m) / 12.0;

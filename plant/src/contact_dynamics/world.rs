@@ -354,7 +354,7 @@ fn near(thing: &Collider, normal: Vector, ends: [Vector; 2], gap_m: f64) -> Near
 
 /// Drops points that are deep between two shapes that only touch. Where a corner of a triangle is touched,
 /// parry may turn the normal to the triangle's face. Along that normal the part may reach far beyond it.
-/// Where two equal prisms stand on each other, it may take the normal of a side that both share.
+/// For two equal prisms that stand on each other, it may take the normal of a side that both share.
 fn drop_false_depths(thing: (&Collider, &Pose), part: (&Collider, &Pose), manifolds: &mut [Manifold]) {
     let shape = thing.0.shape();
     // Round shapes are told rightly, and to ask again takes time and memory.

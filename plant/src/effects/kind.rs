@@ -76,7 +76,7 @@ pub struct VoltageLaw {
     pub exponent: usize,
     /// Place of the voltage at which the declared command map holds.
     pub nominal: usize,
-    /// That voltage for a battery of which this one is the greatest measured, where no file declares it.
+    /// The full voltage of a battery whose greatest measured voltage is the argument. It counts where no file declares one.
     pub full_V: fn(f64) -> f64,
 }
 
