@@ -17,7 +17,7 @@ const TICKS: u32 = 1000;
 const TRANSFER_TICK: u32 = 500;
 
 /// Returns a manifest of all components: the hover that every sensor watches, with the other estimators and laws.
-fn manifest(place: &Place) -> String {
+pub fn manifest(place: &Place) -> String {
     let (vehicle, room) = (repository("vehicles/hummingbird.toml"), repository("scenes/room.toml"));
     let (include, flight) = (repository("manifests/sensors.toml"), place.write("flight.csv", flight()));
     let law = |kind: &str, inputs: &str, parameters: &str| {

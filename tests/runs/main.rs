@@ -10,6 +10,8 @@
 //! - [`campaign`]: thousands of flights with varied values
 //! - [`forks`]: campaigns that go on from a checkpoint
 //! - [`rewinds`]: paused runs that go back
+//! - [`components`]: every component, flown and stepped
+//! - [`allocations`]: a step allocates nothing
 //! - [`clean`]: what dead runs left is removed, and nothing of live ones
 //! - [`terminal`]: a terminal for a program under test
 //! - [`loss`]: every sample is recorded
@@ -55,6 +57,7 @@
 //! - [`inputs`]: files that are edited after they were read
 
 mod all_faults;
+mod allocations;
 mod as_printed;
 mod autopilots;
 mod backups;
