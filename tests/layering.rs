@@ -1,6 +1,6 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
 //! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes,
-//! and components no transport.
+//! components no transport, and the library no terminal and no plots.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -486,6 +486,88 @@ fn components_are_compiled_without_a_transport() {
     for package in WITHOUT_TRANSPORT {
         let found: Vec<_> = reached(package).into_iter().filter(|name| TRANSPORT.contains(name)).collect();
         assert!(found.is_empty(), "{package} needs {found:?}: let it depend on hummingbus-component alone");
+    }
+}
+
+/// Packages of the program's terminal and plots.
+const OF_THE_PROGRAM_ALONE: [&str; 6] = ["clap", "ctrlc", "indicatif", "plotters", "ratatui", "resvg"];
+
+/// Packages of other projects that are compiled with the package `hummingbus`, by the manifests of the workspace.
+fn compiled(with_default_features: bool) -> BTreeSet<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |folder: &str| -> toml::Table {
+        fs::read_to_string(root.join(folder).join("Cargo.toml")).unwrap().parse().unwrap()
+    };
+    let workspace = read("")["workspace"]["dependencies"].as_table().unwrap().clone();
+    let is_set = |options: &toml::Value, key: &str, default: bool| {
+        options.get(key).and_then(toml::Value::as_bool).unwrap_or(default)
+    };
+    let (mut external, mut seen) = (BTreeSet::new(), BTreeSet::new());
+    let mut open = vec![(String::new(), with_default_features)];
+    while let Some((folder, is_default)) = open.pop() {
+        if !seen.insert((folder.clone(), is_default)) {
+            continue;
+        }
+        let manifest = read(&folder);
+        let features = if is_default { default_features(&manifest) } else { BTreeSet::new() };
+        for (name, options) in manifest["dependencies"].as_table().unwrap() {
+            let is_enabled = !is_set(options, "optional", false) || features.contains(&format!("dep:{name}"));
+            let shared = &workspace[name.as_str()];
+            // A feature of another package, such as `report/plots`, counts as all of that package's features.
+            let is_whole = is_set(shared, "default-features", true)
+                || options.get("features").is_some()
+                || features.iter().any(|feature| feature.starts_with(&format!("{name}/")));
+            match shared.get("path").and_then(toml::Value::as_str) {
+                _ if !is_enabled => {}
+                Some(folder) => open.push((folder.to_owned(), is_whole)),
+                None => {
+                    external.insert(name.clone());
+                }
+            }
+        }
+    }
+    external
+}
+
+/// The features of a package that are on by default, and those that they turn on.
+fn default_features(manifest: &toml::Table) -> BTreeSet<String> {
+    let declared = manifest.get("features").and_then(toml::Value::as_table);
+    let (mut found, mut open) = (BTreeSet::new(), vec!["default".to_owned()]);
+    while let Some(feature) = open.pop() {
+        let more = declared.and_then(|declared| declared.get(&feature)?.as_array()).into_iter().flatten();
+        open.extend(
+            more.filter_map(|more| Some(more.as_str()?.to_owned())).filter(|more| !found.contains(more)),
+        );
+        found.insert(feature);
+    }
+    found
+}
+
+#[test]
+fn the_library_is_compiled_without_a_terminal_and_without_plots() {
+    let (library, program) = (compiled(false), compiled(true));
+    let found: Vec<_> = OF_THE_PROGRAM_ALONE.iter().filter(|name| library.contains(**name)).collect();
+    assert!(found.is_empty(), "the library needs {found:?}: make them part of the feature `cli`");
+    let missing: Vec<_> = OF_THE_PROGRAM_ALONE.iter().filter(|name| !program.contains(**name)).collect();
+    assert!(missing.is_empty(), "the program needs other packages than {missing:?} now");
+}
+
+/// Crates whose first lines say in which module each subject is.
+const WITH_A_MAP: [&str; 4] = ["bus", "bus/component", "campaign", "runtime"];
+
+#[test]
+fn the_map_of_a_crate_has_all_its_modules() {
+    for crate_ in WITH_A_MAP {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(crate_).join("src/lib.rs");
+        let text = fs::read_to_string(root).unwrap();
+        let map: String = text.lines().filter(|line| line.starts_with("//! | ")).collect();
+        assert!(!map.is_empty(), "{crate_} has no map");
+        let modules = syn::parse_file(&text).unwrap().items.into_iter().filter_map(|item| match item {
+            Item::Mod(item) if !is_for_tests(&item.attrs) => Some(item.ident.to_string()),
+            _ => None,
+        });
+        let missing: Vec<_> = modules.filter(|name| !map.contains(&format!("`{name}`"))).collect();
+        assert!(missing.is_empty(), "the map of {crate_} has no {missing:?}");
     }
 }
 

@@ -11,7 +11,7 @@
 //! |---|---|
 //! | components of a plan | `making` |
 //! | the plan of a run, written by the launcher | [`plan`], `membership`, `depths`, `names` |
-//! | one tick of a node, under every host | `stepper`, `timing`, [`computing_time`], `computation` |
+//! | one tick of a node, under every host | `stepper`, `tick`, `handles`, `timing`, [`computing_time`], `computation` |
 //! | a node in a process or on a thread | `join`, `place`, `node`, `links`, `connected`, `executor`, `group`, `run_process` |
 //! | all nodes on one thread, without shared memory | `simulation` |
 //! | pacing: the control segment and the clock service | `lockstep`, `clock` |
