@@ -1,5 +1,6 @@
 //! docs/extending.md: its diffs fit the tree, and their new files are those that are compiled here.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,8 +9,9 @@ fn root() -> PathBuf {
     env!("CARGO_MANIFEST_DIR").into()
 }
 
-/// A file of a diff: its path, whether it is new, and its hunks' lines with their marks.
+/// A file of a diff: the heading above, its path, whether it is new, and its hunks' lines with their marks.
 struct Change {
+    heading: String,
     path: String,
     is_new: bool,
     hunks: Vec<Vec<String>>,
@@ -18,16 +20,17 @@ struct Change {
 /// The changes in the ```diff blocks of `text`.
 fn changes(text: &str) -> Vec<Change> {
     let mut changes: Vec<Change> = Vec::new();
-    let (mut in_block, mut is_new) = (false, false);
+    let (mut in_block, mut is_new, mut heading) = (false, false, "");
     for line in text.lines() {
         match line {
             "```diff" => in_block = true,
             "```" => in_block = false,
-            _ if !in_block => {}
+            _ if !in_block => heading = line.strip_prefix("## ").unwrap_or(heading),
             "--- /dev/null" => is_new = true,
             _ if line.starts_with("--- a/") => is_new = false,
             _ if line.starts_with("+++ b/") => {
-                changes.push(Change { path: line[6..].to_owned(), is_new, hunks: Vec::new() });
+                let (heading, path) = (heading.to_owned(), line[6..].to_owned());
+                changes.push(Change { heading, path, is_new, hunks: Vec::new() });
             }
             _ if line.starts_with("@@") => changes.last_mut().unwrap().hunks.push(Vec::new()),
             _ => changes.last_mut().unwrap().hunks.last_mut().unwrap().push(line.to_owned()),
@@ -72,6 +75,31 @@ fn every_diff_of_the_page_fits_the_tree_and_every_new_file_is_compiled_as_it_sta
             assert!(hunk.iter().any(|line| line.starts_with('+')), "{path}: a hunk adds nothing");
         }
     }
+}
+
+/// Lines of a new file, number of other files, and lines that those get, for each heading with a diff.
+fn costs(changes: &[Change]) -> BTreeMap<String, [usize; 3]> {
+    let mut costs = BTreeMap::<String, [usize; 3]>::new();
+    for Change { heading, is_new, hunks, .. } in changes {
+        let [new_lines, others, lines_there] = costs.entry(heading.to_lowercase()).or_default();
+        let lines = hunks.iter().flatten().filter(|line| line.starts_with('+')).count();
+        *(if *is_new { new_lines } else { lines_there }) += lines;
+        *others += usize::from(!is_new);
+    }
+    costs
+}
+
+#[test]
+fn the_page_states_the_files_and_lines_of_each_addition() {
+    let page = std::fs::read_to_string(root().join("docs/extending.md")).unwrap();
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| [")?.split_once("](#"));
+    let stated: BTreeMap<String, [usize; 3]> = rows
+        .map(|(addition, rest)| {
+            let numbers = rest.split(" | ").skip(1).map(|cell| cell.trim_end_matches(" |").parse().unwrap());
+            (addition.to_owned(), numbers.collect::<Vec<usize>>().try_into().unwrap())
+        })
+        .collect();
+    assert_eq!(stated, costs(&changes(&page)));
 }
 
 /// As a reader would: one after another, so that no two are about the same lines.
