@@ -65,6 +65,8 @@ mod node_harness;
 pub mod place;
 pub mod plan;
 mod port;
+#[cfg(test)]
+mod port_suite;
 #[doc(hidden)]
 pub mod process;
 #[doc(hidden)]
