@@ -164,6 +164,14 @@ fn resolved<'a>(
 ) -> Result<Resolved<'a>, Diagnostic> {
     let DeclaredNode { manifest, name, process, program, .. } = declared;
     let (mut parameters, mut edited, mut has_program) = (stated(declared)?, Vec::new(), false);
+    for (key, file, kind) in own_files(declared) {
+        let path = manifest.resolve(&file)?;
+        parameters.insert(key, path.to_string_lossy().into_owned().into());
+        has_program |= kind.role == FileRole::Program;
+        if kind.role != FileRole::Data {
+            notes.models.extend(named_files(declared, read, key, path));
+        }
+    }
     for (key, file) in process.files() {
         let role = file_kind(declared, key).map(|kind| kind.role);
         let is_data = role == Some(FileRole::Data);
@@ -190,6 +198,22 @@ fn resolved<'a>(
         }
     }
     Ok(Resolved { parameters, edited, has_program })
+}
+
+/// Files that `declared` names among its `parameters`: those that its component declares under a key that is no key of a process.
+fn own_files<'a>(declared: &DeclaredNode<'a>) -> Vec<(&'a str, Spanned<String>, FileKind)> {
+    let Some(component) = declared.program.component() else { return Vec::new() };
+    let of = |(key, value): (&'a Spanned<String>, &serde_json::Value)| {
+        let name = key.get_ref().as_str();
+        let kind = component.file(name).filter(|_| !is_file_key(name))?;
+        Some((name, Spanned::new(key.span(), value.as_str()?.to_owned()), kind))
+    };
+    declared.process.parameters.iter().filter_map(of).collect()
+}
+
+/// True for a key of a process that names a file.
+fn is_file_key(key: &str) -> bool {
+    Process::file_keys().any(|file| file == key)
 }
 
 /// Checks the `parameters` of `declared`, a component of `kind`, some of whose files are `edited` copies.
@@ -360,7 +384,7 @@ fn require_none(manifest: &Manifest, process: &Process) -> Result<(), Diagnostic
 /// A refused parameter, at its place.
 fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
     let (name, key) = (declared.name.get_ref(), error.key());
-    let is_file = Process::file_keys().any(|file| file == key);
+    let is_file = is_file_key(key);
     let has_two = declared.process.file(key).is_some()
         && declared.process.parameters.keys().any(|parameter| parameter.get_ref() == key);
     let help = match error {
@@ -540,6 +564,52 @@ mod tests {
         assert_eq!(models(&[]), ["/flight/a.toml", "/flight/table.csv"].map(PathBuf::from));
         let edited = models(&["process.source.configuration.gain=2".to_owned()]);
         assert_eq!(edited, ["/flight/a@source.toml", "/flight/table.csv"].map(PathBuf::from));
+    }
+
+    #[derive(bus::Parameters)]
+    struct MapParameters {
+        /// Map.
+        #[parameter(file = SETTINGS)]
+        map: PathBuf,
+    }
+
+    /// Reads a file at a key that the launcher does not know.
+    struct Mapper;
+    impl Component for Mapper {
+        const INFO: Info = Info::new("mapper", "sends zeros beside a map");
+        type Parameters = MapParameters;
+        type Inputs<'a> = ();
+        type Outputs = Outputs;
+        type State = ();
+        fn new(parameters: MapParameters, context: &NodeContext<'_>) -> Result<Self, ParameterError> {
+            let read = context.files.text(&parameters.map);
+            read.map(|_| Self).map_err(|cause| ParameterError::conflict("map", cause))
+        }
+        fn initial(&self) {}
+        fn step(&self, _: &StepContext<'_>, (): (), (): &mut ()) -> Result<Outputs, StepError> {
+            Ok(Outputs { command: MotorCommand::default() })
+        }
+    }
+
+    const WITH_A_MAP: Registry = Registry::new(&[Registration::of::<Mapper>()]);
+
+    #[test]
+    fn a_component_names_a_file_at_a_key_of_its_own() {
+        let built = |map: &str| {
+            let process = format!("[process.mapper]\nkind = \"mapper\"\nparameters.map = \"{map}\"\n");
+            let text = format!("[run]\nduration_s = 1.0\n{process}");
+            let manifest = Manifest::parse(text, "/flight/m.toml".as_ref(), &[], WITH_A_MAP).unwrap();
+            let files = InputFiles::default();
+            files.keep("/flight/maps/a.toml".as_ref(), b"gain = 1".to_vec());
+            Graph::build_from(&manifest, files)
+        };
+        let graph = built("maps/a.toml").unwrap();
+        assert_eq!(graph.models, ["/flight/maps/a.toml", "/flight/maps/table.csv"].map(PathBuf::from));
+        let node = &graph.plan.nodes[0];
+        assert_eq!(node.parameters["map"], "/flight/maps/a.toml");
+        assert!(node.files.iter().any(|file| file.path == graph.models[0]), "{:?}", node.files);
+        let error = built("maps/b.toml").unwrap_err().to_string();
+        assert!(error.contains("m.toml:5:") && error.contains("process `mapper`"), "{error}");
     }
 
     /// The file of the source in another role.
