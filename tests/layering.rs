@@ -1,6 +1,6 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
 //! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes,
-//! components no transport, and the library no terminal and no plots.
+//! components no transport and no state of their own, and the library no terminal and no plots.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -487,6 +487,34 @@ fn components_are_compiled_without_a_transport() {
         let found: Vec<_> = reached(package).into_iter().filter(|name| TRANSPORT.contains(name)).collect();
         assert!(found.is_empty(), "{package} needs {found:?}: let it depend on hummingbus-component alone");
     }
+}
+
+/// Types that change behind a shared reference, and memory of a thread or a process.
+const CHANGING: [&str; 9] =
+    ["Cell", "RefCell", "OnceCell", "UnsafeCell", "Mutex", "RwLock", "OnceLock", "LazyLock", "thread_local"];
+/// Files that may name them. Linux sends the positions of a gamepad anew whenever it is opened, and a reader of gains ends before a
+/// component is made.
+const WITHOUT_STATE: [&str; 2] = ["controllers/src/gains_file.rs", "controllers/src/gamepad.rs"];
+
+/// A step takes its component by a shared reference, so that nothing else than these types could hide from its state.
+#[test]
+fn what_changes_in_a_component_is_in_its_state() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = BTreeSet::new();
+    for crate_ in ["controllers", "plant", "sensors"] {
+        for module in Crate::read(&root.join(crate_).join("src/lib.rs")).modules.into_values() {
+            let imported = module.imports.values().flatten();
+            let used = module.code.iter().filter_map(|token| match token {
+                Token::Name(name) => Some(name),
+                _ => None,
+            });
+            let is_changing = |name: &String| CHANGING.contains(&name.as_str()) || name.starts_with("Atomic");
+            if imported.chain(used).any(is_changing) {
+                found.insert(module.file.strip_prefix(root).unwrap().display().to_string());
+            }
+        }
+    }
+    assert_eq!(found.iter().collect::<Vec<_>>(), WITHOUT_STATE.iter().collect::<Vec<_>>());
 }
 
 /// Packages of the program's terminal and plots.

@@ -124,7 +124,8 @@ pub(crate) struct Gamepad {
     opened: Mutex<Opened>,
 }
 
-/// The open device. A step reads it behind a shared reference.
+/// The open device. A step reads it behind a shared reference. Positions are no part of the component's state: Linux sends all of them
+/// whenever the device is opened.
 #[derive(Debug)]
 struct Opened {
     file: File,
