@@ -24,6 +24,13 @@ pub struct NodeLatency {
     pub publish: Times,
 }
 
+impl NodeLatency {
+    /// Its name, with its group if it has one: `imu [imu+ekf]`.
+    pub(crate) fn label(&self) -> String {
+        self.group.as_ref().map_or(self.name.clone(), |group| format!("{} [{group}]", self.name))
+    }
+}
+
 /// A topic on its way to one reader.
 #[derive(Debug, Serialize)]
 pub struct Transport {

@@ -81,8 +81,8 @@ function drawNodes() {
     const traces = node.parts.map((part) => steps(part, COLOURS[part.name]));
     addPlot("histograms", "small", traces, layout(node.name, "µs", "ticks", { xaxis: LOG, yaxis: LOG }), SMALL);
   }
-  fillTable("nodes", [left("node"), left("part"), ...COUNTED], profile.nodes.flatMap((node) =>
-    grouped(node.name, NODE_PARTS.map(([key, name]) => [left(name), ...counted(node[key])]))));
+  fillTable("nodes", [left("node"), left("part"), ...COUNTED], profile.nodes.flatMap((node, index) =>
+    grouped(data.nodes[index].name, NODE_PARTS.map(([key, name]) => [left(name), ...counted(node[key])]))));
 }
 
 function drawHops() {

@@ -35,7 +35,7 @@ fn data(run: &str, flight: &Flight, profile: &Profile) -> Value {
     let nodes = profile.nodes.iter().map(|node| {
         let times = [&node.wait, &node.wake_up, &node.compute, &node.publish];
         let parts = PARTS.iter().zip(times).map(|(name, times)| histogram(name, times));
-        json!({ "name": node.name, "parts": parts.collect::<Vec<_>>() })
+        json!({ "name": node.label(), "parts": parts.collect::<Vec<_>>() })
     });
     let jitter = profile.pacing.as_ref().map(|pacing| histogram("deadline to grant", &pacing.jitter));
     json!({

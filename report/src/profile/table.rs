@@ -60,7 +60,7 @@ fn place(place: &PlaceShare) -> Row<'_> {
 
 /// The parts of a node's ticks; its name stands before the first.
 fn node(node: &NodeLatency) -> [Row<'_>; 4] {
-    let name = node.group.as_ref().map_or(node.name.clone(), |group| format!("{} [{group}]", node.name));
+    let name = node.label();
     [
         (format!("{name:<40} wait"), &node.wait),
         (format!("{:<40} wake-up", ""), &node.wake_up),

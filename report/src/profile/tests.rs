@@ -8,7 +8,7 @@ use super::latency::latencies;
 use super::pacing::Pacing;
 use super::path::{CriticalPath, Path, Place, Stretch};
 use super::times::Times;
-use bus::plan::{InputPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
+use bus::plan::{GroupPlan, InputPlan, MemberPlan, NodePlan, OutputPlan, Pace, Plan, TopicPlan, Wait};
 use bus::profile::{GrantWriter, TickWriter};
 use bus::sample_ticks::SampleTicks;
 use runtime::flight::{Cause, Flight};
@@ -318,6 +318,20 @@ fn a_tick_that_was_sent_before_its_process_died_is_that_one_s() {
     let replacements = [replacement(1, Some(0), inputs)];
     let flight = Flight::open(&plan, folder.path(), plan.duration_ticks, &replacements).unwrap();
     assert_eq!(flight.sent_ns(COMMAND, 0), Some(1450));
+}
+
+#[test]
+fn members_of_a_group_have_its_name_in_all_outputs() {
+    let mut flight = free_flight();
+    let members = [PLANT, IMU].map(|node| MemberPlan { node, kind: "test".to_owned() });
+    flight.plan.groups = vec![GroupPlan { name: "body".to_owned(), members: members.into(), cpu: None }];
+    let profile = super::Profile::of(&flight, 0, None);
+    let groups = profile.nodes.iter().map(|node| node.group.as_deref());
+    assert_eq!(groups.collect::<Vec<_>>(), [Some("body"), Some("body"), None]);
+    let page = String::from_utf8(profile.page("a run", &flight)).unwrap();
+    for text in [profile.to_string(), page] {
+        assert!(text.contains("imu [body]") && !text.contains("controller [body]"));
+    }
 }
 
 #[test]
