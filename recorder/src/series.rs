@@ -22,41 +22,6 @@ pub struct Series {
 }
 
 impl Recording {
-    /// The values of `fields`, given as topic and field path: a series each, read in one pass.
-    ///
-    /// ```no_run
-    /// use recorder::reader::Recording;
-    ///
-    /// let recording = Recording::open("hover.mcap".as_ref())?;
-    /// let series = recording.series(&[("/plant/state", "position.z"), ("/plant/state", "attitude.yaw")])?;
-    /// let highest_m = series[0].value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    /// assert!(highest_m < 1.7);
-    /// # Ok::<(), recorder::RecordingError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// If there is no such topic or field, or the file is damaged.
-    pub fn series(&self, fields: &[(&str, &str)]) -> Result<Vec<Series>, RecordingError> {
-        fields.iter().try_for_each(|(topic, _)| self.topic(topic).map(|_| ()))?;
-        let mut series = vec![Series::default(); fields.len()];
-        self.visit::<RecordingError>(|message| {
-            let wanted = |(topic, _): &(&str, &str)| message.topic == *topic;
-            if !fields.iter().any(wanted) {
-                return Ok(());
-            }
-            let leaves = self.decode_on(message.topic, message.cdr)?;
-            for (series, field) in series.iter_mut().zip(fields).filter(|(_, field)| wanted(field)) {
-                let unknown = || RecordingError::unknown_field(message.topic, field.1, &leaves);
-                let (value, unit) = value(&leaves, field.1).ok_or_else(unknown)?;
-                series.time_ns.push(message.time_ns);
-                series.value.push(value);
-                unit.clone_into(&mut series.unit);
-            }
-            Ok(())
-        })?;
-        Ok(series)
-    }
-
     /// The numbers of `field` on `topic`: itself, or the parts `x`, `y` and `z` of a vector.
     ///
     /// # Errors

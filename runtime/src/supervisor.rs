@@ -1,4 +1,4 @@
-//! Supervision of a run: starts its processes, reacts to events, and ends everything again.
+//! Supervisor of a run: starts its processes, reacts to events, and ends everything again.
 //!
 //! - `state_machine`: states of a run, events, actions
 //! - `decisions`: consequences of the end of a process
