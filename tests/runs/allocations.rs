@@ -1,8 +1,8 @@
-//! Allocations of a step: none, in any component.
+//! Allocations of a step: none, in any component. Recording, verdict and summary take none for each tick.
 
 use crate::components;
-use crate::support::Place;
-use hummingbus::COMPONENTS;
+use crate::support::{Place, repository};
+use hummingbus::{COMPONENTS, Host, Launcher};
 use runtime::manifest::Manifest;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -49,4 +49,22 @@ fn a_step_of_any_component_allocates_nothing() {
         simulation.step().unwrap();
         assert_eq!(ALLOCATIONS.get() - before, 0, "allocations at tick {tick}");
     }
+}
+
+/// Allocations of a recorded hover on this thread, its verdict and its summary included.
+fn allocations_of_a_hover(duration_s: f64) -> u64 {
+    let place = Place::new();
+    let manifest = hummingbus::load(repository("manifests/hover.toml")).unwrap();
+    let manifest = manifest.set("run.duration_s", duration_s).unwrap();
+    let before = ALLOCATIONS.get();
+    let flown = hummingbus::fly(Launcher::new(Host::InProcess), &manifest, place.path("hover.mcap")).unwrap();
+    assert!(flown.recording.is_some());
+    ALLOCATIONS.get() - before
+}
+
+/// Chunks of the file, and lists that grow, take a few.
+#[test]
+fn a_recorded_flight_that_is_longer_takes_hardly_more_allocations() {
+    let (short, long) = (allocations_of_a_hover(1.0), allocations_of_a_hover(2.0));
+    assert!(long < short + 1000, "{short} allocations in 1000 ticks, {long} in 2000");
 }
