@@ -1,6 +1,6 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
-//! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes,
-//! components no transport and no state of their own, and the library no terminal and no plots.
+//! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes.
+//! Components know no transport, and hide nothing that changes from their states. The library needs no terminal and no plots.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
