@@ -96,6 +96,7 @@ pub struct Launcher<'a> {
     host: Host,
     stop: StopToken,
     adopts_orphans: bool,
+    is_part: bool,
     on: Box<dyn FnMut(RunEvent<'_>) + 'a>,
     remote: Remote,
     requests: Receiver<Asked>,
@@ -113,6 +114,7 @@ impl<'a> Launcher<'a> {
             host,
             stop: StopToken::new(),
             adopts_orphans: false,
+            is_part: false,
             on: Box::new(|_| {}),
             remote: Remote::new(sender),
             requests,
@@ -301,6 +303,32 @@ impl<'a> Launcher<'a> {
         self
     }
 
+    /// The run is a flight that a longer command flies for itself, such as one of `identify`. While another run of this user is alive,
+    /// `top`, `ctl`, `swap` and `view` find this one by `--run` alone.
+    ///
+    /// ```
+    /// # use bus::Registration;
+    /// # use runtime::{host::Host, launcher::Launcher, manifest::Manifest, registry::Registry};
+    /// # const COMPONENTS: Registry = Registry::new(&[Registration::of::<controllers::pilot::Pilot>()]);
+    /// # let folder = tempfile::tempdir()?;
+    /// # let text = "[run]\nduration_s = 0.05\n[process.pilot]\nkind = \"pilot\"\nparameters.initial_altitude_m = 1.0\n";
+    /// # let manifest = Manifest::parse(text.to_owned(), &folder.path().join("a.toml"), &[], COMPONENTS)?;
+    /// # let path = folder.path().join("a.mcap");
+    /// use runtime::run_dir::run_of_launcher;
+    /// let mut is_part = false;
+    /// let launcher = Launcher::new(Host::InProcess).as_part().followed_by(|_| {
+    ///     is_part |= run_of_launcher(std::process::id()).is_some_and(|run| run.entry.is_part);
+    /// });
+    /// launcher.fly(&manifest, &path)?;
+    /// assert!(is_part);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn as_part(mut self) -> Self {
+        self.is_part = true;
+        self
+    }
+
     /// Steers the run from another thread.
     #[must_use]
     pub fn remote(&self) -> Remote {
@@ -355,7 +383,7 @@ impl<'a> Launcher<'a> {
             Host::require_proc()?;
         }
         let place = Place::take(self.adopts_orphans)?;
-        let mut run_dir = RunDir::create(&manifest.path)?;
+        let mut run_dir = RunDir::create(&manifest.path, self.is_part)?;
         let run_id = run_dir.run_id().to_owned();
         let mut on = std::mem::replace(&mut self.on, Box::new(|_| {}));
         let (rewinds, files, mut executed) =
@@ -384,7 +412,7 @@ impl<'a> Launcher<'a> {
             *graph = next;
             files.go_back(rewind.to_tick, &rewind.path);
             rewinds.begin(rewind, recording);
-            run_dir = RunDir::create_again(&manifest.path, &run_id)?;
+            run_dir = RunDir::create_again(&manifest.path, &run_id, self.is_part)?;
         }
     }
 

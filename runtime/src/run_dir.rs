@@ -51,6 +51,9 @@ pub struct Entry {
     /// The number of the terminal on which it was started; `None` if it has none.
     #[serde(default)]
     pub terminal: Option<u32>,
+    /// True for a flight that a longer command flies for itself, such as one of `identify`.
+    #[serde(default)]
+    pub is_part: bool,
 }
 
 impl Entry {
@@ -64,7 +67,7 @@ impl Entry {
         let run_dir = new_run_dir(&run_id)?;
         let (manifest, launcher) = (manifest.to_owned(), std::process::id());
         let folder = std::env::current_dir().unwrap_or_default();
-        Ok(Self { run_id, run_dir, manifest, launcher, folder, terminal: terminal() })
+        Ok(Self { run_id, run_dir, manifest, launcher, folder, terminal: terminal(), is_part: false })
     }
 
     /// Entry of run `run_id` in `file`; `None` for any other content.
@@ -137,12 +140,13 @@ pub(crate) struct RunDir {
 }
 
 impl RunDir {
-    /// Registers a new run of `manifest` and creates its directory, open to this user alone.
+    /// Registers a new run of `manifest`, which `is_part` of a longer command or not, and creates its directory, open to this user
+    /// alone.
     ///
     /// # Errors
     /// If shared memory or the folder for temporary files cannot be written to.
-    pub fn create(manifest: &Path) -> Result<Self, Error> {
-        Ok(Self::create_by(manifest, Entry::new)?)
+    pub fn create(manifest: &Path, is_part: bool) -> Result<Self, Error> {
+        Ok(Self::create_by(manifest, |manifest| Ok(Entry { is_part, ..Entry::new(manifest)? }))?)
     }
 
     /// Registers a run that goes on under its old name, `run_id`, after its files were removed; creates its
@@ -150,8 +154,9 @@ impl RunDir {
     ///
     /// # Errors
     /// As [`RunDir::create`].
-    pub fn create_again(manifest: &Path, run_id: &str) -> Result<Self, Error> {
-        Ok(Self::create_by(manifest, |manifest| Entry::named(manifest, run_id.to_owned()))?)
+    pub fn create_again(manifest: &Path, run_id: &str, is_part: bool) -> Result<Self, Error> {
+        let new = |manifest: &Path| Ok(Entry { is_part, ..Entry::named(manifest, run_id.to_owned())? });
+        Ok(Self::create_by(manifest, new)?)
     }
 
     fn create_by(manifest: &Path, new: impl Fn(&Path) -> anyhow::Result<Entry>) -> anyhow::Result<Self> {
@@ -483,7 +488,7 @@ impl Here {
     }
 }
 
-/// True if a run is alive that was started in this folder and on this terminal.
+/// True if a run is alive that was started in this folder and on this terminal, and is no part of a longer command.
 ///
 /// ```
 /// assert!(!runtime::run_dir::is_own_alive(), "this process flies none");
@@ -491,11 +496,11 @@ impl Here {
 #[must_use]
 pub fn is_own_alive() -> bool {
     let here = Here::of_this_process();
-    live_runs().iter().any(|run| here.has(&run.entry))
+    live_runs().iter().any(|run| !run.entry.is_part && here.has(&run.entry))
 }
 
 /// The live run named `run_id`. Without a name, the only one, or of several the only one that was started in this folder and on
-/// this terminal.
+/// this terminal. Parts of longer commands, such as the flights of `identify`, are found without a name only if no other run is alive.
 ///
 /// # Errors
 /// If there is no such run, or several to choose from; the error lists the live runs.
@@ -543,6 +548,9 @@ pub fn run_of_launcher(launcher: u32) -> Option<LiveRun> {
 }
 
 fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>, here: &Here) -> anyhow::Result<LiveRun> {
+    if run_id.is_none() && runs.iter().any(|run| !run.entry.is_part) {
+        runs.retain(|run| !run.entry.is_part);
+    }
     let is_own = |run: &LiveRun| run_id.is_none() && here.has(&run.entry);
     if runs.iter().filter(|run| is_own(run)).count() == 1 {
         runs.retain(is_own);
@@ -580,7 +588,8 @@ mod tests {
         let run = |name: &&str| {
             let run_id = (*name).to_owned();
             let (run_dir, manifest, folder) = ("/t".into(), "/m.toml".into(), "/f".into());
-            let entry = Entry { run_id, run_dir, manifest, launcher: 1, folder, terminal: Some(7) };
+            let (launcher, terminal, is_part) = (1, Some(7), false);
+            let entry = Entry { run_id, run_dir, manifest, launcher, folder, terminal, is_part };
             LiveRun { entry, file: tempfile::tempfile().unwrap() }
         };
         names.iter().map(run).collect()
@@ -680,6 +689,21 @@ mod tests {
         assert_eq!(chosen(&[1], Some("3-c")).unwrap(), "3-c");
         assert!(chosen(&[1, 2], None).unwrap_err().to_string().contains("3 runs are alive"));
         assert!(chosen(&[], None).is_err());
+    }
+
+    #[test]
+    fn a_flight_of_a_longer_command_is_the_default_only_if_it_is_alone() {
+        let here = Here { folder: "/f".into(), terminal: Some(7) };
+        let chosen = |names: &[&str], run_id| {
+            let mut runs = runs(names);
+            runs[0].entry.is_part = true;
+            choose(runs, run_id, &here).map(|run| run.entry.run_id)
+        };
+        assert_eq!(chosen(&["1-a", "2-b"], None).unwrap(), "2-b");
+        assert_eq!(chosen(&["1-a", "2-b"], Some("1-a")).unwrap(), "1-a");
+        assert_eq!(chosen(&["1-a"], None).unwrap(), "1-a");
+        let error = chosen(&["1-a", "2-b", "3-c"], None).unwrap_err().to_string();
+        assert!(error.contains("2 runs are alive") && !error.contains("1-a"), "{error}");
     }
 
     #[test]

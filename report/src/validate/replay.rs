@@ -102,7 +102,7 @@ impl Replay {
     ) -> Result<(f64, Recording)> {
         let manifest = self.manifest.build(&self.folder.join(MANIFEST), components)?;
         // The other files that the run reads are its own.
-        let launcher = Launcher::new(host.clone()).reading(files.branch()).stopped_by(stop);
+        let launcher = Launcher::new(host.clone()).as_part().reading(files.branch()).stopped_by(stop);
         // Only processes have descendants; a program that embeds this one may have children of its own meanwhile.
         let launcher = match host {
             Host::Exe(_) => launcher.adopting_orphans(),
