@@ -44,6 +44,8 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// True if the run was stopped before its end.
     pub stopped_early: bool,
+    /// Conditions that were not judged, because the run was stopped before its end.
+    pub not_judged: usize,
     /// Deadlines missed.
     pub missed_deadlines: u32,
     /// The processes.
@@ -171,6 +173,7 @@ impl Summary {
             ticks_per_s,
             real_time_factor: ticks_per_s * tick_s,
             stopped_early: outcome.was_stopped,
+            not_judged: 0,
             missed_deadlines: outcome.missed_deadlines,
             processes: outcome.processes.into_iter().map(process).collect(),
             computing_times: outcome.overruns.into_iter().map(overruns).collect(),
@@ -204,6 +207,7 @@ impl Summary {
         plan: &Plan,
         content: &Content,
     ) -> Result<(), Error> {
+        self.count_left_out(content);
         match (recording, figures) {
             (Some(recording), Some(figures)) => {
                 self.judge_by(figures, content)?;
@@ -220,6 +224,14 @@ impl Summary {
         }
     }
 
+    /// Counts the conditions in `content` that a run leaves out since it was stopped.
+    fn count_left_out(&mut self, content: &Content) {
+        if self.stopped_early {
+            let compared = content.compare.iter().filter(|compare| compare.get_ref().judged);
+            self.not_judged = content.pass.len() + compared.count();
+        }
+    }
+
     /// Notes that the flight before has no figures: conditions in `content` that are not judged have not held.
     fn leave_unjudged(&mut self, content: &Content) {
         self.is_unjudged = !content.conditions().topics().is_empty();
@@ -233,6 +245,7 @@ impl Summary {
     /// # Errors
     /// If the recording is damaged, or lacks data that a condition judges.
     pub fn judge(&mut self, recording: &Recording, plan: &Plan, content: &Content) -> Result<(), Error> {
+        self.count_left_out(content);
         if !self.stopped_early {
             self.add(&judge::figures(&content.conditions(), recording)?, content)?;
         }
@@ -258,6 +271,7 @@ impl Summary {
     /// # Errors
     /// If the figures are not those of `content`, or there is nothing to compare.
     pub fn judge_by(&mut self, figures: &[u8], content: &Content) -> Result<(), Error> {
+        self.count_left_out(content);
         if self.stopped_early { Ok(()) } else { self.add(&Figures::of_bytes(figures)?, content) }
     }
 
@@ -300,6 +314,17 @@ impl Summary {
         written.or_else(|| from.filter(|from| failed_at.is_some() && is_before(from)))
     }
 
+    /// The end of a run that was stopped: its time, and the conditions that were not judged. Nothing has failed, and nothing has passed.
+    fn stop_in_words(&self) -> String {
+        let stopped_at_s = f64::from(self.first_tick + self.ticks) * self.tick_s;
+        let left_out = match self.not_judged {
+            0 => String::new(),
+            1 => "; its condition was not judged".to_owned(),
+            count => format!("; its {count} conditions were not judged"),
+        };
+        format!("stopped before its end, at {stopped_at_s:.3} s{left_out}")
+    }
+
     /// The replacements as text; those that were refused are never left out.
     fn write_replacements(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = self.replacements.iter().enumerate();
@@ -330,9 +355,6 @@ impl fmt::Display for Summary {
             writeln!(f, "  from the checkpoint of tick {} on", self.first_tick)?;
         }
         self.rewinds.iter().try_for_each(|rewound| writeln!(f, "  {rewound}"))?;
-        if self.stopped_early {
-            writeln!(f, "  stopped before its end")?;
-        }
         if self.missed_deadlines > 0 {
             writeln!(f, "  {} deadlines missed", self.missed_deadlines)?;
         }
@@ -368,16 +390,67 @@ impl fmt::Display for Summary {
         }
         self.missed_checkpoints.iter().try_for_each(|missed| writeln!(f, "  warning: {missed}"))?;
         let refused = self.replacements.iter().filter(|replacement| replacement.has_failed()).count();
+        if self.stopped_early && refused > 0 {
+            writeln!(f, "  {}", self.stop_in_words())?;
+        }
         match (self.passed, refused) {
             (true, _) if self.has_no_condition() => {
                 write!(f, "passed: the run completed, and no condition judges it")
             }
             (true, _) => write!(f, "passed"),
-            (false, 0) if self.stopped_early => write!(f, "FAILED: stopped before its end"),
+            (false, 0) if self.stopped_early => f.write_str(&self.stop_in_words()),
             (false, 0) if self.is_unjudged => write!(f, "FAILED: the conditions were not judged"),
             (false, 0) => write!(f, "FAILED"),
             (false, 1) => write!(f, "FAILED: a backup was refused"),
             (false, _) => write!(f, "FAILED: {refused} backups were refused"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Summary;
+    use runtime::launcher::Outcome;
+    use runtime::manifest::Content;
+
+    fn stopped(conditions: usize) -> Summary {
+        let outcome = Outcome {
+            first_tick: 100,
+            ticks: 2000,
+            was_stopped: true,
+            host_s: 2.0,
+            missed_deadlines: 0,
+            processes: Vec::new(),
+            overruns: Vec::new(),
+            remarks: Vec::new(),
+            replacements: Vec::new(),
+            flight: None,
+            figures: None,
+            checkpoints: Vec::new(),
+            missed_checkpoints: Vec::new(),
+            rewinds: Vec::new(),
+        };
+        let mut summary = Summary::new("hover".to_owned(), outcome, 1e-3);
+        let condition = "[[pass]]\nname = \"high\"\ntopic = \"/plant/state\"\nfield = \"position.z\"\nunit = \"m\"\n\
+                         statistic = \"every\"\nmin = 1.0\n";
+        let manifest = format!("[run]\nduration_s = 9.0\n[process]\n{}", condition.repeat(conditions));
+        let content: Content = toml::from_str(&manifest).unwrap();
+        summary.judge_by(&[], &content).unwrap();
+        summary
+    }
+
+    #[test]
+    fn a_run_that_was_stopped_has_neither_passed_nor_failed() {
+        for (conditions, end) in [
+            (0, "stopped before its end, at 2.000 s"),
+            (1, "stopped before its end, at 2.000 s; its condition was not judged"),
+            (2, "stopped before its end, at 2.000 s; its 2 conditions were not judged"),
+        ] {
+            let summary = stopped(conditions);
+            assert!(!summary.passed && summary.not_judged == conditions, "{summary}");
+            let text = summary.to_string();
+            assert!(text.ends_with(end) && text.matches("stopped").count() == 1, "{text}");
+            assert!(!text.contains("FAILED") && !text.contains("passed"), "{text}");
         }
     }
 }

@@ -152,6 +152,8 @@ fn a_stop_and_ctrl_c_end_a_paused_run_at_its_tick() {
         }
         let summary = flight.end().with_code(1).json();
         assert_eq!((&summary["stopped_early"], &summary["ticks"]), (&true.into(), &held.into()));
+        // Those of hover.toml.
+        assert_eq!((&summary["passed"], &summary["not_judged"]), (&false.into(), &6.into()));
     }
 }
 
