@@ -57,7 +57,10 @@ use table::commands;
 #[derive(Parser)]
 #[command(
     version = env!("HUMMINGBUS_VERSION"),
-    after_help = "Example: hummingbus run manifests/hover.toml\n\n`hummingbus COMMAND --help` tells what a command takes."
+    after_help = "Example: hummingbus run manifests/hover.toml\n\n`hummingbus COMMAND --help` tells what a command takes.\n\n\
+                  Pages called docs/NAME.md are in the folder docs of a checkout, and in share/doc/hummingbus/docs of an installation: \
+                  /usr/share/doc/hummingbus/docs of the Debian package. The first is docs/first-hour.md. Shipped manifests are in \
+                  manifests of a checkout, and in share/hummingbus/manifests of an installation."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -15,10 +15,25 @@ const FOLDERS: (&str, &str) = ("/src/cli/project/", "/../");
 const BUILT_LIBRARY: &str = "\
 # The library of hummingbus: the installed one, or else one that Cargo builds from its sources.
 find_package(hummingbus QUIET)
-if(NOT hummingbus_FOUND)
+if(NOT hummingbus_FOUND AND EXISTS [==[@path@]==])
   add_subdirectory([==[@path@]==] hummingbus)
-endif()
+elseif(NOT hummingbus_FOUND)
+@missing@endif()
 ";
+/// Lines of CMake for the library of an installed hummingbus.
+const INSTALLED_LIBRARY: &str = "\
+# The library of hummingbus, which its Debian package and its tarball install.
+find_package(hummingbus @version@ QUIET)
+if(NOT hummingbus_FOUND)
+@missing@endif()
+";
+/// Lines of CMake that say where CMake looks for the library. CMake prints an indented line as it is.
+const MISSING_LIBRARY: &str = r#"  message(FATAL_ERROR "CMake found no library of hummingbus @version@.
+    The Debian package and the tarball of hummingbus hold it.
+    If they are in a folder of their own, name the folder that has bin, include and lib:
+      cmake -DCMAKE_PREFIX_PATH=FOLDER -S controller -B controller/build
+    pkg-config takes PKG_CONFIG_PATH=FOLDER/lib/pkgconfig.")
+"#;
 /// Longest name of a project.
 const NAME_BYTES_MAX: usize = 64;
 /// Sources that this program was built from.
@@ -191,13 +206,11 @@ fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Pat
         Some(path) => format!("path = {}", toml::Value::from(path)),
         None => format!("version = {:?}", env!("CARGO_PKG_VERSION")),
     };
-    let library = match path("bindings/c") {
-        Some(path) => BUILT_LIBRARY.replace("@path@", &path),
-        None => format!(
-            "# The installed library of hummingbus.\nfind_package(hummingbus {} REQUIRED)\n",
-            env!("CARGO_PKG_VERSION")
-        ),
-    };
+    let library = if sources.is_some() { BUILT_LIBRARY } else { INSTALLED_LIBRARY };
+    let library = library
+        .replace("@missing@", MISSING_LIBRARY)
+        .replace("@version@", env!("CARGO_PKG_VERSION"))
+        .replace("@path@", &path("bindings/c").unwrap_or_default());
     let package = path("python").map_or_else(|| "hummingbus".to_owned(), |path| quoted(Path::new(&path)));
     // The paths last: one may have the project's name in it.
     template
@@ -218,4 +231,22 @@ fn write(path: &Path, text: &str) -> Result<()> {
     fs::create_dir_all(folder)
         .and_then(|()| fs::write(path, text))
         .with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CPP, filled};
+    use std::path::Path;
+
+    #[test]
+    fn a_project_whose_library_is_missing_says_how_to_name_it() {
+        let file = |sources| filled(include_str!("project/cpp/CMakeLists.txt"), "quad", &CPP, sources);
+        let (installed, built) = (file(None), file(Some(Path::new("/sources"))));
+        for text in [&installed, &built] {
+            assert!(text.contains("cmake -DCMAKE_PREFIX_PATH=FOLDER -S controller"), "{text}");
+            assert!(!text.contains('@'), "{text}");
+        }
+        assert!(!installed.contains("add_subdirectory"), "{installed}");
+        assert!(built.contains("\n  add_subdirectory([==[/sources/bindings/c]==] hummingbus)\n"), "{built}");
+    }
 }

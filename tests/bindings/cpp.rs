@@ -92,6 +92,23 @@ fn a_new_project_in_cpp_is_built_and_passes_its_own_test() {
 }
 
 #[test]
+fn a_project_whose_library_is_gone_says_how_to_name_its_folder() {
+    let place = Place::new();
+    let folder = place.path("my-quad");
+    place.call(&["new", &folder, "--language", "cpp", "--sources", &repository("")]).with_code(0);
+    let file = format!("{folder}/controller/CMakeLists.txt");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replace("/bindings/c]==]", "/gone]==]")).unwrap();
+    let mut configure = Command::new("cmake");
+    configure.args(["-S", &format!("{folder}/controller"), "-B", &format!("{folder}/controller/build")]);
+    // As on a system without the library, wherever one is installed here.
+    configure.arg("-DCMAKE_DISABLE_FIND_PACKAGE_hummingbus=TRUE");
+    let ended = configure.output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(!ended.status.success() && said.contains("cmake -DCMAKE_PREFIX_PATH=FOLDER"), "{said}");
+}
+
+#[test]
 fn a_checkpoint_holds_the_state_of_a_controller_in_cpp() {
     let place = Place::new();
     let manifest = shipped(&place, "cpp-controller.toml");

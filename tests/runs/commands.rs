@@ -501,7 +501,9 @@ fn every_subcommand_shows_an_example() {
         // Of several the title is "Examples".
         ended.prints(&["Example", &format!(": hummingbus {command} ")]);
     }
-    place.call(&["--help"]).with_code(0).prints(&["Example: hummingbus run manifests/hover.toml"]);
+    let pages = ["share/doc/hummingbus/docs", "docs/first-hour.md"];
+    let help = place.call(&["--help"]).with_code(0);
+    help.prints(&[&["Example: hummingbus run manifests/hover.toml"], &pages[..]].concat());
 }
 
 #[test]
@@ -515,6 +517,8 @@ fn shells_and_the_manual_know_the_commands() {
     place.call(&["completions", "cmd"]).with_code(2).says(&["bash", "zsh", "fish"]);
     let folder = place.path("man1");
     place.call(&["man", &folder]).with_code(0);
+    let whole = fs::read_to_string(format!("{folder}/hummingbus.1")).unwrap();
+    assert!(whole.contains("share/doc/hummingbus/docs"), "{whole}");
     let page = fs::read_to_string(format!("{folder}/hummingbus-run.1")).unwrap();
     assert!(page.starts_with(".ie") || page.starts_with(".TH"), "{page}");
     assert!(page.contains("in\\-process"), "{page}");
