@@ -201,12 +201,48 @@ pub(crate) fn body(cdr: &[u8]) -> Result<&[u8], DecodeError> {
     }
 }
 
+/// Comment of a field in a definition: `[m/s] in world: velocity of the centre of mass`. A part that it lacks is empty.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Comment {
+    /// Unit.
+    pub unit: String,
+    /// Frame in which a vector is written.
+    pub frame: String,
+    /// Meaning of the field.
+    pub meaning: String,
+}
+
+impl Comment {
+    fn parse(text: &str) -> Self {
+        let text = text.trim();
+        let (unit, rest) = text.strip_prefix('[').and_then(|rest| rest.split_once(']')).unwrap_or(("", text));
+        let rest = rest.trim();
+        // The name of a frame is one word; other text with a colon is part of the meaning.
+        let framed = rest.strip_prefix("in ").and_then(|rest| rest.split_once(':'));
+        let (frame, meaning) = framed.filter(|(frame, _)| !frame.contains(' ')).unwrap_or(("", rest));
+        Self { unit: unit.to_owned(), frame: frame.to_owned(), meaning: meaning.trim().to_owned() }
+    }
+
+    /// Takes unit and frame of `inner`, where it has them, and adds its meaning.
+    fn narrow(&mut self, inner: &Self) {
+        for (part, inner) in [(&mut self.unit, &inner.unit), (&mut self.frame, &inner.frame)] {
+            if !inner.is_empty() {
+                part.clone_from(inner);
+            }
+        }
+        if !self.meaning.is_empty() && !inner.meaning.is_empty() {
+            self.meaning.push(' ');
+        }
+        self.meaning.push_str(&inner.meaning);
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Field {
     base: String,
     repeat: Repeat,
     name: String,
-    unit: String,
+    comment: Comment,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -272,6 +308,31 @@ impl Definition {
         Ok(Self { root, types: messages.collect() })
     }
 
+    /// The comment on the field at `path`, such as `position.z`. Unit and frame are those of the innermost field on the way that has them;
+    /// the meaning is that of all fields on the way.
+    ///
+    /// ```
+    /// use recorder::definition::Definition;
+    ///
+    /// let text = "a_msgs/Point[2] corner  # [m] in body: Corners.\n\
+    ///             ================\nMSG: a_msgs/Point\nfloat64 x\nfloat64 y  # To the left.\n";
+    /// let definition = Definition::parse("a_msgs/msg/Plate", text)?;
+    /// let corner = definition.about("corner[1].y");
+    /// assert_eq!((&*corner.unit, &*corner.frame, &*corner.meaning), ("m", "body", "Corners. To the left."));
+    /// # Ok::<(), recorder::definition::DefinitionError>(())
+    /// ```
+    #[must_use]
+    pub fn about(&self, path: &str) -> Comment {
+        let (mut fields, mut about) = (&self.root[..], Comment::default());
+        for part in path.split('.') {
+            let name = part.split('[').next().unwrap_or(part);
+            let Some(field) = fields.iter().find(|field| field.name == name) else { break };
+            about.narrow(&field.comment);
+            fields = self.types.get(&field.base).map_or(&[][..], Vec::as_slice);
+        }
+        about
+    }
+
     /// Decodes a message: its encapsulation header and body.
     ///
     /// # Errors
@@ -311,7 +372,7 @@ const PRIMITIVES: [&str; 15] = [
     "int64", "uint64", "string", "wstring",
 ];
 
-/// The field in a line of a message of `package`, the unit from its comment; `None` if the line is a constant or
+/// The field in a line of a message of `package`, with its comment; `None` if the line is a constant or
 /// empty.
 fn parse_field(line: &str, package: &str) -> Result<Option<Field>, DefinitionError> {
     let (code, comment) = line.split_once('#').unwrap_or((line, ""));
@@ -333,9 +394,8 @@ fn parse_field(line: &str, package: &str) -> Result<Option<Field>, DefinitionErr
             (base, Repeat::Fixed(length))
         }
     };
-    let unit =
-        comment.trim().strip_prefix('[').and_then(|rest| rest.split_once(']')).map_or("", |(unit, _)| unit);
-    Ok(Some(Field { base: whole_name(base, package), repeat, name, unit: unit.to_owned() }))
+    let comment = Comment::parse(comment);
+    Ok(Some(Field { base: whole_name(base, package), repeat, name, comment }))
 }
 
 /// The type without a bound, and with its package.
@@ -371,7 +431,7 @@ struct Walk<'a> {
 impl Walk<'_> {
     fn message(&mut self, fields: &[Field], prefix: &str, unit: &str) -> Result<(), DecodeError> {
         for field in fields {
-            let unit = if field.unit.is_empty() { unit } else { &field.unit };
+            let unit = if field.comment.unit.is_empty() { unit } else { &field.comment.unit };
             let path =
                 if prefix.is_empty() { field.name.clone() } else { format!("{prefix}.{}", field.name) };
             let length = match field.repeat {
@@ -471,7 +531,7 @@ impl Cursor<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Definition, Value, is_padding};
+    use super::{Comment, Definition, Value, is_padding};
     use bus::Message;
     use bus::messages::{
         BodyTransform, FrameName, LaserScan, MotorCommand, Odometry, Orientation, Point, PoseStamped,
@@ -481,6 +541,22 @@ mod tests {
 
     fn cdr<T: Message>(message: &T) -> Vec<u8> {
         [&[0, 1, 0, 0], bytemuck::bytes_of(message)].concat()
+    }
+
+    #[test]
+    fn a_comment_has_unit_frame_and_meaning_and_may_lack_each() {
+        let parts = |text: &str| {
+            let Comment { unit, frame, meaning } = Comment::parse(text);
+            [unit, frame, meaning]
+        };
+        assert_eq!(parts(" [m/s] in world: velocity of the body"), ["m/s", "world", "velocity of the body"]);
+        assert_eq!(parts(" [1]"), ["1", "", ""]);
+        assert_eq!(parts(" in body: force"), ["", "body", "force"]);
+        assert_eq!(parts("in units of the sensor: counts"), ["", "", "in units of the sensor: counts"]);
+        let schema = MotorCommand::SCHEMA;
+        let definition = Definition::parse(schema.type_name, &schema.ros2_definition()).unwrap();
+        assert_eq!(definition.about("command[3]").unit, "count");
+        assert_eq!(definition.about("none"), Comment::default());
     }
 
     #[test]

@@ -5,7 +5,7 @@ pub use crate::container::{Damage, Messages};
 use crate::container::Channels;
 use crate::container::blocks::{Block, leading_attachments};
 use crate::container::summary::{attachment, summary};
-use crate::definition::{Definition, Leaf};
+use crate::definition::{Comment, Definition, Leaf};
 use crate::error::RecordingError;
 use crate::source::Source;
 use std::collections::BTreeMap;
@@ -53,6 +53,12 @@ impl Topic {
     /// The definition of its messages.
     pub(crate) fn definition(&self) -> &Definition {
         &self.definition
+    }
+
+    /// Unit, frame and meaning of the field at `path`, such as `position.z`, as [`Definition::about`] finds them.
+    #[must_use]
+    pub fn about(&self, path: &str) -> Comment {
+        self.definition.about(path)
     }
 }
 

@@ -3,12 +3,19 @@
 use crate::columns::{Column, write_parquet};
 use diagnostics::Error;
 use recorder::RecordingError;
-use recorder::definition::{Leaf, Value, is_padding};
+use recorder::definition::{Comment, Leaf, Value, is_padding};
 use recorder::reader::Recording;
 use std::io::Write;
 
 /// First bytes of an exported CSV file.
 pub const CSV_START: &str = "tick,time_ns";
+/// First bytes of a CSV file that explains the columns of an exported one.
+pub const COLUMNS_START: &str = "column,unit,frame,meaning";
+/// Explanation of the columns that every table has.
+const STAMPS: [[&str; 4]; 2] = [
+    ["tick", "", "", "tick at which the message was sent"],
+    ["time_ns", "ns", "", "simulated time of this tick, from 0"],
+];
 
 /// Messages of a topic: a row for each message, a column for each field.
 ///
@@ -30,6 +37,9 @@ pub const CSV_START: &str = "tick,time_ns";
 /// let mut text = Vec::new();
 /// table.write_csv(&mut text)?;
 /// assert!(String::from_utf8(text)?.ends_with("\n3,3000000,0,0,1.5,0.0,0.0,0.0\n"));
+/// let mut columns = Vec::new();
+/// table.write_columns(&mut columns)?;
+/// assert!(String::from_utf8(columns)?.contains("\naltitude,m,"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -39,11 +49,13 @@ pub struct Table {
     fields: Vec<Field>,
 }
 
-/// A column with its path and unit.
+/// A column with its path and unit, and with the frame and the meaning that the definition of the message states.
 #[derive(Clone, Debug)]
 struct Field {
     path: String,
     unit: String,
+    frame: String,
+    meaning: String,
     column: Column,
 }
 
@@ -52,7 +64,7 @@ struct Field {
 /// # Errors
 /// If the recording is damaged, or has no such topic.
 pub fn table(recording: &Recording, topic: &str) -> Result<Table, Error> {
-    recording.topic(topic)?;
+    let definition = recording.topic(topic)?;
     let mut table = Table::default();
     recording.visit::<RecordingError>(|message| {
         if message.topic == topic {
@@ -60,6 +72,10 @@ pub fn table(recording: &Recording, topic: &str) -> Result<Table, Error> {
         }
         Ok(())
     })?;
+    for field in &mut table.fields {
+        let Comment { frame, meaning, .. } = definition.about(&field.path);
+        (field.frame, field.meaning) = (frame, meaning);
+    }
     Ok(table)
 }
 
@@ -102,7 +118,8 @@ impl Table {
             Value::Integer(_) => Column::Integer(Vec::new()),
             Value::Text(_) => Column::Text(Vec::new()),
         };
-        self.fields.push(Field { path: leaf.path.clone(), unit: leaf.unit.clone(), column });
+        let (path, unit) = (leaf.path.clone(), leaf.unit.clone());
+        self.fields.push(Field { path, unit, frame: String::new(), meaning: String::new(), column });
         self.fields.len() - 1
     }
 
@@ -136,6 +153,23 @@ impl Table {
             let stamps = [self.tick[row].to_string(), self.time_ns[row].to_string()];
             let cells = self.fields.iter().map(|field| cell(&field.column, row));
             out.write_record(stamps.into_iter().chain(cells)).map_err(Error::new)?;
+        }
+        Ok(out.flush()?)
+    }
+
+    /// Writes a table of the columns as CSV: name, unit, frame and meaning of each. A cell is empty where the definition of the message
+    /// does not state it.
+    ///
+    /// # Errors
+    /// If `out` cannot be written to.
+    pub fn write_columns(&self, out: impl Write) -> Result<(), Error> {
+        let mut out = csv::Writer::from_writer(out);
+        out.write_record(COLUMNS_START.split(',')).map_err(Error::new)?;
+        let fields = self.fields.iter();
+        let fields = fields
+            .map(|Field { path, unit, frame, meaning, .. }| [path, unit, frame, meaning].map(String::as_str));
+        for row in STAMPS.into_iter().chain(fields) {
+            out.write_record(row).map_err(Error::new)?;
         }
         Ok(out.flush()?)
     }

@@ -4,19 +4,23 @@ use super::files::open_recording;
 use super::output::print_text;
 use anyhow::{Result, bail};
 use clap::Args;
+use diagnostics::Error;
 use report::columns::PARQUET_START;
-use report::export::{CSV_START, Table, table};
+use report::export::{COLUMNS_START, CSV_START, table};
 use runtime::output_file::{self, Kind, Mark};
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 /// Examples that `--help` shows.
 pub const HELP: &str = "Examples:
   hummingbus export hover.mcap                                  writes hover/plant.state.parquet and a file for each other topic
-  hummingbus export hover.mcap --topic /plant/state --csv
+  hummingbus export hover.mcap --topic /plant/state --csv     writes hover/plant.state.csv, and plant.state.columns.csv with units and frames
   hummingbus export hover.mcap --out tables";
 
 const PARQUET: Kind = Kind { name: "Parquet file", mark: Mark::Start(PARQUET_START) };
 const CSV: Kind = Kind { name: "CSV file", mark: Mark::Start(CSV_START.as_bytes()) };
+const COLUMNS: Kind = Kind { name: "file of columns", mark: Mark::Start(COLUMNS_START.as_bytes()) };
 
 /// Arguments of `export`.
 #[derive(Args)]
@@ -29,7 +33,7 @@ pub struct ExportArguments {
     /// Write Parquet, as without an option.
     #[arg(long, conflicts_with = "csv")]
     parquet: bool,
-    /// Write CSV instead of Parquet.
+    /// Write CSV instead of Parquet, and beside each file another one with the unit, frame and meaning of its columns.
     #[arg(long)]
     csv: bool,
     /// Folder of the files; the recording's path without its ending if left out.
@@ -54,31 +58,63 @@ pub fn export(arguments: &ExportArguments) -> Result<bool> {
     let (ending, kind) = if is_csv { ("csv", &CSV) } else { ("parquet", &PARQUET) };
     let is_wanted = |topic: &&String| arguments.topic.is_empty() || arguments.topic.contains(topic);
     let topics = recording.topics().keys().filter(is_wanted);
-    let files: Vec<(PathBuf, &String)> =
-        topics.map(|topic| (folder.join(file_name(topic, ending)), topic)).collect();
-    for (path, _) in &files {
-        if files.iter().filter(|(other, _)| other == path).count() > 1 {
-            bail!("two topics would be written to {}: name one with --topic", path.display());
-        }
+    let files: Vec<Files<'_>> =
+        topics.map(|topic| Files::of(topic, folder.join(file_name(topic, ending)))).collect();
+    let paths: Vec<&PathBuf> = files.iter().flat_map(|files| files.paths(is_csv)).collect();
+    if let Some(path) = paths.iter().find(|path| paths.iter().filter(|other| other == path).count() > 1) {
+        bail!("two topics would be written to {}: name one with --topic", path.display());
     }
     output_file::make_folder(&folder)?;
     // Before the first is written.
-    for (path, _) in &files {
+    for Files { path, columns, .. } in &files {
         output_file::check(path, kind)?;
+        if is_csv {
+            output_file::check(columns, &COLUMNS)?;
+        }
     }
     // One after another: a table is whole in memory.
-    for (path, topic) in &files {
+    for Files { topic, path, columns } in &files {
         let table = table(&recording, topic)?;
-        write(path, kind, &table, is_csv)?;
-        print_text(&format!("{}: {} messages", path.display(), table.rows()))?;
+        let messages = format!("{}: {} messages", path.display(), table.rows());
+        if is_csv {
+            write(path, kind, |out| table.write_csv(out))?;
+            write(columns, &COLUMNS, |out| table.write_columns(out))?;
+            print_text(&format!("{messages}; units and frames: {}", columns.display()))?;
+        } else {
+            write(path, kind, |out| table.write_parquet(out))?;
+            print_text(&messages)?;
+        }
     }
     Ok(recording.cut().is_none())
 }
 
-fn write(path: &Path, kind: &Kind, table: &Table, is_csv: bool) -> Result<()> {
+/// Files of a topic.
+struct Files<'a> {
+    topic: &'a String,
+    path: PathBuf,
+    /// Explains the columns of a CSV file.
+    columns: PathBuf,
+}
+
+impl<'a> Files<'a> {
+    fn of(topic: &'a String, path: PathBuf) -> Self {
+        let columns = path.with_extension("columns.csv");
+        Self { topic, path, columns }
+    }
+
+    /// The paths that are written.
+    fn paths(&self, is_csv: bool) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.path).chain(is_csv.then_some(&self.columns))
+    }
+}
+
+fn write(
+    path: &Path,
+    kind: &Kind,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), Error>,
+) -> Result<()> {
     Ok(output_file::write(path, kind, |out| {
-        let written = if is_csv { table.write_csv(out) } else { table.write_parquet(out) };
-        written.map_err(|error| std::io::Error::other(error.with_causes()))
+        write(out).map_err(|error| std::io::Error::other(error.with_causes()))
     })?)
 }
 

@@ -458,9 +458,17 @@ fn an_export_replaces_no_file_of_another_kind_and_names_an_unknown_topic() {
     place.call(&args).with_code(0);
     let file = format!("{out}/plant.state.csv");
     assert!(fs::read_to_string(&file).unwrap().starts_with("tick,time_ns,"));
-    fs::write(&file, "a letter").unwrap();
-    place.call(&args).with_code(2).says(&["plant.state.csv"]);
-    assert_eq!(fs::read_to_string(&file).unwrap(), "a letter");
+    let columns = format!("{out}/plant.state.columns.csv");
+    let text = fs::read_to_string(&columns).unwrap();
+    assert!(text.starts_with("column,unit,frame,meaning\n"), "{text}");
+    assert!(text.contains("\nvelocity.x,m/s,world,") && text.contains("\ntime_ns,ns,,"), "{text}");
+    for file in [&file, &columns] {
+        let before = fs::read_to_string(file).unwrap();
+        fs::write(file, "a letter").unwrap();
+        place.call(&args).with_code(2).says(&[file]);
+        assert_eq!(fs::read_to_string(file).unwrap(), "a letter");
+        fs::write(file, before).unwrap();
+    }
     let parquet = ["export", &recording, "--out", &out, "--topic", "/plant/state", "--parquet"];
     place.call(&parquet).with_code(0).prints(&["plant.state.parquet: ", " messages"]);
     let both = place.call(&[&parquet[..], &["--csv"]].concat()).with_code(2);

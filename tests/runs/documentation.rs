@@ -359,3 +359,27 @@ fn the_files_of_the_page_on_your_own_drone_are_flown_and_read() {
     let read = place.call(&["validate", &file("vehicle.toml"), &file("flights.toml"), "--steps-ahead", "1"]);
     read.with_code(0).prints(&["flight1", "flight2", "attitude (deg)"]);
 }
+
+/// The recipe of docs/plots.md: an exported flight is read as a log.
+#[test]
+fn an_exported_flight_is_read_as_the_page_on_tables_says() {
+    let place = Place::new();
+    let (recording, tables) = (place.path("hover.mcap"), place.path("tables"));
+    // Too short for its conditions.
+    let args = ["run", &repository("manifests/hover.toml"), "--record", &recording];
+    place.call(&[&args[..], &["--set", "run.duration_s=2.5"]].concat()).with_code(1);
+    place.call(&["export", &recording, "--csv", "--out", &tables]).with_code(0);
+    let blocks = code_blocks("docs/plots.md", "toml");
+    let flights = blocks.iter().find(|block| block.contains("[channels]")).unwrap();
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let flights = place.write("flights.toml", flights.replace("vehicles/hummingbird.toml", &vehicle));
+    let read = place.call(&["validate", &vehicle, &flights, "--steps-ahead", "1"]).with_code(0);
+    read.prints(&["hover", "position (m)", "attitude (deg)", "rates (rad/s)"]);
+    // The rows that the page shows are those of the file, in this order.
+    let columns = fs::read_to_string(format!("{tables}/plant.state.columns.csv")).unwrap();
+    let page = fs::read_to_string(repository("docs/plots.md")).unwrap();
+    let (_, shown) = page.split_once("\n```\ncolumn,").unwrap();
+    let shown = format!("column,{}", shown.split("\n```").next().unwrap());
+    let found: Vec<&str> = columns.lines().filter(|line| shown.lines().any(|row| row == *line)).collect();
+    assert_eq!(found, shown.lines().collect::<Vec<_>>(), "{columns}");
+}
