@@ -30,7 +30,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<bool> {
     let recording = arguments.run.manifest.as_ref().filter(is_recording);
     match (&arguments.process, recording) {
         (Some(process), None) => {
-            let with = steer::description(&arguments.with)?;
+            let with = steer::description(&arguments.with, process)?;
             run(&arguments.run, None, Some((process, &with)))
         }
         (None, Some(path)) => {

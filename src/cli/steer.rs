@@ -1,6 +1,7 @@
 //! `hummingbus ctl` and `hummingbus swap`: a live run is steered from outside.
 
 use super::interrupts::stop_token;
+use super::kind::Kind;
 use super::{foxglove, output, view};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
@@ -132,7 +133,8 @@ pub fn ctl(arguments: &CtlArguments) -> Result<bool> {
 pub struct SwapArguments {
     /// The process to replace.
     process: String,
-    /// Differences of its backup: a TOML file, or TOML text, with the keys of a process; none where absent.
+    /// Differences of its backup: a TOML file, or TOML text, with the keys of one process (kind, command, gains, parameters), not
+    /// a whole manifest; none where absent.
     #[arg(long, value_name = "FILE|TOML", default_value = "")]
     with: String,
     /// Ticks that the backup computes beside the process before it takes over.
@@ -156,7 +158,7 @@ pub struct SwapArguments {
 pub fn swap(arguments: &SwapArguments) -> Result<bool> {
     let request = Request::Swap {
         process: arguments.process.clone(),
-        with: description(&arguments.with)?,
+        with: description(&arguments.with, &arguments.process)?,
         shadow_ticks: arguments.shadow_ticks,
         at_tick: arguments.at_tick,
     };
@@ -222,8 +224,11 @@ fn ask_for_swap(run: &LiveRun, request: &Request, process: &str) -> Result<Answe
     Ok(answer?)
 }
 
-/// The TOML text that `given` is, or that the file of this name holds.
-pub fn description(given: &str) -> Result<String> {
+/// The TOML text that `given` is, or that the file of this name holds: keys of `process`, in which its backup or shadow differs.
+///
+/// # Errors
+/// If it is no TOML, or a whole file of another kind, such as a manifest. The error says how to name what was meant.
+pub fn description(given: &str, process: &str) -> Result<String> {
     let is_file = !given.is_empty() && (Path::new(given).is_file() || !given.contains('='));
     let text = if is_file {
         InputFiles::default().text(Path::new(given)).with_context(|| {
@@ -233,8 +238,54 @@ pub fn description(given: &str) -> Result<String> {
         given.to_owned()
     };
     let place = if is_file { given } else { "its text" };
-    text.parse::<toml::Table>().with_context(|| format!("--with: {place} is no TOML"))?;
+    let table = text.parse::<toml::Table>().with_context(|| format!("--with: {place} is no TOML"))?;
+    require_keys_of(process, place, Kind::of(text.as_bytes()), &table)?;
     Ok(text)
+}
+
+/// Refuses a file of another kind than keys of a process.
+fn require_keys_of(process: &str, place: &str, kind: Option<Kind>, table: &toml::Table) -> Result<()> {
+    // Gains within the keys of a process look like a file of gains.
+    let names_gains = ["gains", "parameters"].iter().any(|key| table.contains_key(*key));
+    let (kind, advice) = match kind {
+        Some(Kind::Manifest) => (Kind::Manifest, how_to_name(process, table)),
+        Some(Kind::Gains) if !names_gains => (Kind::Gains, as_key("gains", place)),
+        Some(Kind::Vehicle) => (Kind::Vehicle, as_key("vehicle", place)),
+        Some(Kind::Scene) => (Kind::Scene, as_key("scene", place)),
+        Some(kind @ (Kind::Flights | Kind::Stand | Kind::Campaign)) => (kind, kind.reader(place)),
+        _ => return Ok(()),
+    };
+    bail!(
+        "--with: {place} is {}, expected keys of one process, such as kind = \"pid\" or parameters.gains.roll = {{ … }}\n{advice}",
+        kind.name()
+    )
+}
+
+/// Advice for a file that a key of a process names.
+fn as_key(key: &str, file: &str) -> String {
+    format!(
+        "name the file by its key: --with '{key} = \"{file}\"'; its path starts at the folder of the run's manifest"
+    )
+}
+
+/// Advice for a whole manifest, of which one process is meant.
+fn how_to_name(process: &str, manifest: &toml::Table) -> String {
+    let processes = manifest.get("process").and_then(toml::Value::as_table);
+    let names: Vec<&str> = processes.into_iter().flat_map(toml::Table::keys).map(String::as_str).collect();
+    let source = match names.as_slice() {
+        names if names.contains(&process) => process,
+        [only] => only,
+        _ => "NAME",
+    };
+    let there = if source == "NAME" && !names.is_empty() {
+        format!("; its processes are {}", names.join(", "))
+    } else {
+        String::new()
+    };
+    format!(
+        "to swap to a process of that manifest, save the keys below its [process.{source}], without this line, as a file: \
+         --with FILE; paths in it start at the folder of the run's manifest{there}"
+    )
 }
 
 fn ask(run_id: Option<&str>, request: &Request, json: bool) -> Result<()> {
@@ -279,10 +330,45 @@ mod tests {
     fn a_backup_is_described_by_a_file_or_by_text() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "kind = 'pid'\n").unwrap();
-        assert_eq!(description(file.path().to_str().unwrap()).unwrap(), "kind = 'pid'\n");
-        assert_eq!(description("kind='pid'").unwrap(), "kind='pid'");
-        let message = |text| format!("{:#}", description(text).unwrap_err());
+        assert_eq!(description(file.path().to_str().unwrap(), "pid").unwrap(), "kind = 'pid'\n");
+        assert_eq!(description("kind='pid'", "pid").unwrap(), "kind='pid'");
+        assert_eq!(description("", "pid").unwrap(), "");
+        let message = |text| format!("{:#}", description(text, "pid").unwrap_err());
         assert!(message("kind='").contains("its text is no TOML"), "{}", message("kind='"));
         assert!(message("nowhere.toml").contains("cannot read nowhere.toml"));
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_refused_with_what_to_name_in_its_place() {
+        let message = |text: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), text).unwrap();
+            let path = file.path().to_str().unwrap();
+            description(path, "controller").unwrap_err().to_string().replace(path, "FILE.toml")
+        };
+        let run = "[run]\nduration_s = 1.0\n";
+        for (processes, expected) in [
+            ("[process.controller]\nkind = 'pid'", "below its [process.controller], without this line"),
+            ("[process.law]\nkind = 'pid'", "below its [process.law]"),
+            ("[process.a]\nkind = 'a'\n[process.b]\nkind = 'b'", "its processes are a, b"),
+            ("", "[process.NAME]"),
+        ] {
+            let text = message(&format!("{run}{processes}"));
+            assert!(
+                text.starts_with("--with: FILE.toml is a manifest, expected keys of one process"),
+                "{text}"
+            );
+            assert!(text.contains(expected), "{text}");
+        }
+        let gains = "[roll]\nproportional = { value = 1, unit = '1/s^2', source = 'tuned' }";
+        let text = message(gains);
+        assert!(
+            text.contains("is a gains file") && text.contains("--with 'gains = \"FILE.toml\"'"),
+            "{text}"
+        );
+        assert!(message("name = 'v'\nbase = 'w.toml'").contains("--with 'vehicle = \"FILE.toml\"'"));
+        // The same as text, and gains within the keys of a process.
+        assert!(description("process.controller.kind = 'pid'", "controller").is_err());
+        assert!(description(&gains.replace("[roll]", "[gains.roll]"), "controller").is_ok());
     }
 }
