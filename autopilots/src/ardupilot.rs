@@ -222,12 +222,16 @@ fn check_period(period_s: f64) -> Result<(), ParameterError> {
             "the period is {} s, expected less than {PERIOD_MAX_S} s: ArduPilot's clock takes no longer step",
             nine_decimals(period_s)
         )
-    });
+    })
+    .map_err(|error| error.advised("lower `period_ticks`, or raise run.rate_hz"));
     let is_whole = refuse((period_us - period_us.round()).abs() > 1e-6, "period_ticks", || {
         format!(
             "the period is {} us, expected whole microseconds: ArduPilot's clock cuts each step to them",
             nine_decimals(period_us)
         )
+    })
+    .map_err(|error| {
+        error.advised("choose run.rate_hz so that a tick has whole microseconds, such as 1000 or 400")
     });
     ParameterError::both(is_short, is_whole).map(drop)
 }

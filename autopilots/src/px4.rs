@@ -267,6 +267,7 @@ fn check_period(context: &NodeContext<'_>) -> Result<(), ParameterError> {
         let period = nine_decimals(context.period_s());
         format!("the period is {period} s, expected one of which 4 ms is a multiple: PX4 senses every 4 ms")
     })
+    .map_err(|error| error.advised("choose run.rate_hz and `period_ticks` for a period of 1, 2 or 4 ms"))
 }
 
 impl Px4 {

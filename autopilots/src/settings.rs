@@ -3,7 +3,7 @@
 use bus::context::NodeContext;
 use bus::{FileKind, FileRole};
 use controllers::airframe::ControlledVehicle;
-use diagnostics::ParameterError;
+use diagnostics::{Diagnostic, ParameterError};
 use diagnostics::parameter::refuse;
 use std::path::Path;
 use std::time::Duration;
@@ -35,7 +35,8 @@ pub fn file(context: &NodeContext<'_>, key: &'static str, path: &Path) -> Result
     let bytes = context
         .files
         .bytes(path)
-        .map_err(|error| ParameterError::conflict(key, format!("cannot read {}: {error}", path.display())))?;
+        .map_err(|error| ParameterError::conflict(key, format!("cannot read {}: {error}", path.display())))
+        .map_err(|error| error.advised(Diagnostic::CHECK_PATH))?;
     Ok(bytes.to_vec())
 }
 
@@ -80,6 +81,7 @@ pub fn require_text(program: &[u8], path: &Path, mark: &str, reason: &str) -> Re
     refuse(!has_text, "firmware", || {
         format!("{}: {reason}: the text `{mark}` does not occur in it", path.display())
     })
+    .map_err(|error| error.advised("build the firmware as docs/firmware.md says, and name that program"))
 }
 
 /// True for an ELF program with a program header that names the dynamic linker.

@@ -151,7 +151,12 @@ fn forwarded<'a>(
     let of = |input: &'a InputPlan| {
         let type_name = &plan.topics[input.topic].type_name;
         let schema = message_of(components, type_name);
-        let unknown = || ParameterError::conflict(&input.port, format!("nobody knows {type_name}"));
+        let unknown = || {
+            let message =
+                format!("no component has a port of {type_name}, which the input `{}` forwards", input.port);
+            ParameterError::conflict(&input.port, message)
+                .advised("add the component that sends it to the components")
+        };
         Ok((input.port.as_str(), schema.ok_or_else(unknown)?))
     };
     let mut all = node.inputs.iter().map(of).collect::<Result<Vec<_>, ParameterError>>()?;

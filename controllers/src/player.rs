@@ -42,7 +42,8 @@ fn load(parameters: &Parameters, files: &InputFiles) -> Result<FlightLog, Parame
     let (from_s, length_s) = (parameters.from_s, log.duration_s());
     refuse(!(0.0..length_s).contains(&from_s), "from_s", || {
         format!("`from_s` is {from_s} s, the flight lasts {length_s:.3} s")
-    })?;
+    })
+    .map_err(|error| error.advised("choose a time within the flight, from 0 on"))?;
     Ok(log)
 }
 

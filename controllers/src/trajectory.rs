@@ -157,7 +157,11 @@ impl Trajectory {
         self.segments.iter().enumerate().try_for_each(|(index, segment)| {
             let times = (0..=LOOKS).map(|look| segment.duration_s * f64::from(look) / f64::from(LOOKS));
             times.map(|since_s| segment.at(segment.start_s + since_s)).try_for_each(|point| {
-                point.require_flyable().map_err(|error| error.within(&format!("segments.{index}")))
+                point.require_flyable().map_err(|error| {
+                    error
+                        .within(&format!("segments.{index}"))
+                        .advised("make the segment slower, longer or larger")
+                })
             })
         })
     }

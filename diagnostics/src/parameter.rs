@@ -48,8 +48,10 @@ pub enum ParameterError {
     Conflict {
         /// The dotted key that is to blame first; empty where no key is.
         key: String,
-        /// Contradiction, and advice.
+        /// Contradiction.
         message: String,
+        /// Advice; empty where the message says what to do.
+        help: String,
     },
     /// A file that the parameter names, with the faults in it.
     #[error("{faults}")]
@@ -143,7 +145,31 @@ impl ParameterError {
     /// Creates the error for a contradiction, of which `key` is to blame first; empty where none is.
     #[must_use]
     pub fn conflict(key: impl Into<String>, message: impl Display) -> Self {
-        Self::Conflict { key: key.into(), message: message.to_string() }
+        Self::Conflict { key: key.into(), message: message.to_string(), help: String::new() }
+    }
+
+    /// The same with `help` as the advice on a contradiction, in each of several errors. Other errors keep the advice that follows from
+    /// what was expected.
+    ///
+    /// ```
+    /// use diagnostics::ParameterError;
+    ///
+    /// let error = ParameterError::conflict("scene", "the scene holds a rig").advised("leave `rig` out of the scene");
+    /// assert_eq!((error.to_string().as_str(), error.help().as_str()), ("the scene holds a rig", "leave `rig` out of the scene"));
+    /// assert_eq!(error.of("process `plant`").within("process.plant").help(), "leave `rig` out of the scene");
+    /// ```
+    #[must_use]
+    pub fn advised(mut self, help: impl Into<String>) -> Self {
+        self.advise(&help.into());
+        self
+    }
+
+    fn advise(&mut self, advice: &str) {
+        match self {
+            Self::Conflict { help, .. } => advice.clone_into(help),
+            Self::Several(errors) => errors.iter_mut().for_each(|error| error.advise(advice)),
+            Self::Value { .. } | Self::Missing { .. } | Self::Unknown { .. } | Self::File { .. } => {}
+        }
     }
 
     /// Gathers the results of all `checks`, which do not depend on each other.
@@ -217,7 +243,7 @@ impl ParameterError {
                 faults.who = if faults.who.is_empty() { who } else { format!("{who}: {}", faults.who) };
                 Self::File { key, faults }
             }
-            error => Self::conflict(error.key(), format!("{who}: {error}")),
+            error => Self::conflict(error.key(), format!("{who}: {error}")).advised(error.help()),
         }
     }
 
@@ -243,7 +269,8 @@ impl ParameterError {
                 self.suggestion().unwrap_or_else(|| "remove it, or write one of these keys".to_owned())
             }
             Self::Value { .. } => self.suggestion().unwrap_or_default(),
-            Self::File { .. } | Self::Conflict { .. } | Self::Several(_) => String::new(),
+            Self::Conflict { help, .. } => help.clone(),
+            Self::File { .. } | Self::Several(_) => String::new(),
         }
     }
 
@@ -314,7 +341,10 @@ impl ParameterError {
 
     fn reword(&mut self, reword: &impl Fn(&str) -> String) {
         match self {
-            Self::Conflict { message, .. } => *message = reword(message),
+            Self::Conflict { message, help, .. } => {
+                *message = reword(message);
+                *help = reword(help);
+            }
             Self::File { faults, .. } => faults.each.iter_mut().for_each(|fault| fault.reword(reword)),
             Self::Several(errors) => errors.iter_mut().for_each(|error| error.reword(reword)),
             Self::Value { .. } | Self::Missing { .. } | Self::Unknown { .. } => {}
@@ -418,10 +448,11 @@ pub fn require(
     if is_good { Ok(()) } else { Err(ParameterError::value(key, expected, found)) }
 }
 
-/// Refuses parameters that do not go together; `key` is to blame first.
+/// Refuses parameters that do not go together; `key` is to blame first. The `message` has the contradiction, and advice behind a
+/// semicolon. Longer advice is that of [`ParameterError::advised`].
 ///
 /// # Errors
-/// They do not, as `is_wrong` says; `message` has the contradiction, and advice.
+/// They do not, as `is_wrong` says.
 ///
 /// ```
 /// use diagnostics::parameter::refuse;
@@ -607,6 +638,25 @@ mod tests {
         let both = ParameterError::both(positive("a", 0.0), finite("b", f64::NAN)).unwrap_err();
         let named = both.of("plant").into_each();
         assert!(named.iter().all(|error| error.to_string().starts_with("plant: ")), "{named:?}");
+    }
+
+    #[test]
+    fn advice_goes_with_its_error() {
+        let refused = |advice: &str| {
+            refuse(true, "a", || "a and b exclude each other").map_err(|error| error.advised(advice))
+        };
+        let error = refused("leave b out").unwrap_err().reworded(|text| text.replace('b', "c"));
+        assert_eq!(
+            (error.to_string(), error.help()),
+            ("a and c exclude each other".into(), "leave c out".into())
+        );
+        let both =
+            ParameterError::both(refused(""), positive("d", 0.0)).unwrap_err().advised("leave one out");
+        let helps: Vec<String> = both.of("plant").into_each().iter().map(ParameterError::help).collect();
+        assert_eq!(helps, ["leave one out", ""]);
+        // What follows from the error itself is kept behind the name of a component, too.
+        let value = ParameterError::value("kind", "\"step\", \"ramp\" or \"doublet\"", "\"stp\"").of("plant");
+        assert_eq!((value.help(), value.key()), ("did you mean `step`?".into(), "kind"));
     }
 
     #[test]

@@ -42,7 +42,8 @@ impl Component for Traffic {
         let count = context.inputs.len();
         refuse(count > TRAFFIC_MAX, "", || {
             format!("{count} inputs, expected at most {TRAFFIC_MAX} vehicles")
-        })?;
+        })
+        .map_err(|error| error.advised("leave inputs out: a second `traffic` takes the others"))?;
         Ok(Self)
     }
 

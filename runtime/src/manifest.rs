@@ -384,9 +384,7 @@ impl Manifest {
         let in_words = |text: &str| self.without_copy_in(files, (name, key), (original, copy), text);
         let (parameter, mut faults) = match error {
             ParameterError::File { key, faults } => (key, faults),
-            ParameterError::Conflict { key, message } => {
-                return ParameterError::Conflict { key, message: in_words(&message) };
-            }
+            conflict @ ParameterError::Conflict { .. } => return conflict.reworded(in_words),
             error => return error,
         };
         let edits: Vec<&FileEdit> = self.file_edits.iter().filter(|edit| edit.is_of(name, key)).collect();

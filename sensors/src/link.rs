@@ -293,7 +293,8 @@ impl Component for Link {
         let mut names = context.inputs.to_vec();
         names.sort_unstable();
         let (count, most) = (names.len(), STREAMS);
-        let inputs = refuse(count > most, "", || format!("it has {count} inputs, expected at most {most}"));
+        let inputs = refuse(count > most, "", || format!("it has {count} inputs, expected at most {most}"))
+            .map_err(|error| error.advised("let a second link carry the others"));
         let unknown = parameters.streams.keys().filter(|name| !names.contains(&name.as_str()));
         let unknown = unknown.map(|name| {
             Err::<(), _>(ParameterError::unknown(format!("streams.{name}"), names.iter().copied()))

@@ -274,7 +274,7 @@ fn how_to_name(process: &str, manifest: &toml::Table) -> String {
     let names: Vec<&str> = processes.into_iter().flat_map(toml::Table::keys).map(String::as_str).collect();
     let source = match names.as_slice() {
         names if names.contains(&process) => process,
-        [only] => only,
+        [only] => *only,
         _ => "NAME",
     };
     let there = if source == "NAME" && !names.is_empty() {

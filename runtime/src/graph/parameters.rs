@@ -403,6 +403,7 @@ fn refused(declared: &DeclaredNode<'_>, error: &ParameterError) -> Diagnostic {
         ParameterError::Unknown { .. } if key == "rate_hz" => error.suggestion().unwrap_or_else(|| {
             format!("the rate of `{name}` follows from `period_ticks` in [process.{name}]")
         }),
+        ParameterError::Conflict { help, .. } => help.clone(),
         _ => error.suggestion().unwrap_or_default(),
     };
     let is_unknown = matches!(error, ParameterError::Unknown { .. });
