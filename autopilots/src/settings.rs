@@ -3,8 +3,8 @@
 use bus::context::NodeContext;
 use bus::{FileKind, FileRole};
 use controllers::airframe::ControlledVehicle;
-use diagnostics::{Diagnostic, ParameterError};
 use diagnostics::parameter::refuse;
+use diagnostics::{Diagnostic, ParameterError};
 use std::path::Path;
 use std::time::Duration;
 use vehicles::{Rotor, Vehicle};
