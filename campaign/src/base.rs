@@ -1,11 +1,11 @@
 //! The manifest that all flights have in common, and the files it reads: read once.
 
-use crate::declaration::{Campaign, Meaning, Start, Varied};
+use crate::declaration::{Campaign, DURATION, Meaning, Start, Varied};
 use crate::draw::rounded;
 use crate::measures::changed;
 use crate::row::{columns, require_different, units, verdict_columns};
 use anyhow::{Context, Result, bail};
-use diagnostics::{Diagnostic, ParameterError, did_you_mean};
+use diagnostics::{Diagnostic, Error, Faults, ParameterError, did_you_mean};
 use inputs::{InputFiles, sha256};
 use runtime::checkpoint::Checkpoint;
 use runtime::graph::Graph;
@@ -14,9 +14,6 @@ use runtime::registry::Registry;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-
-/// Key of the duration of a run. Where it is varied, a measure may see some flights only.
-const DURATION: &str = "run.duration_s";
 
 /// The manifest of a campaign, not recorded, with the files that its flights read.
 #[derive(Debug)]
@@ -70,20 +67,43 @@ impl Base {
                 (manifest.placing(campaign.set_places.clone()), Some(from))
             }
         };
+        let is_measured = !campaign.measures.is_empty() && !campaign.varies(DURATION);
         let graph = runtime::require_flyable(&manifest, files, from.as_ref())
-            .map_err(|error| in_place(campaign, &manifest.path, lines, error.into()))?;
-        if !campaign.measures.is_empty() && !campaign.varies(DURATION) {
-            graph
-                .require_samples(&manifest, length)
-                .map_err(|error| in_place(campaign, &manifest.path, lines, error.into()))?;
-        }
-        require_judgement(&manifest)?;
+            .map_err(anyhow::Error::from)
+            .and_then(|graph| {
+                if is_measured {
+                    graph.require_samples(&manifest, length)?;
+                }
+                Ok(graph)
+            })
+            .map_err(|error| in_place(campaign, &manifest.path, lines, error));
         let (figures, verdicts) = (columns(&manifest.content), verdict_columns(&manifest.content));
-        require_different(&campaign.vary, &[&figures[..], &verdicts].concat())?;
-        let kept = kept(campaign, &figures)?;
+        let different = require_different(&campaign.vary, &[&figures[..], &verdicts].concat());
+        let (mut errors, path) = (Vec::new(), &campaign.path);
+        let graph = keep(graph, &mut errors);
+        keep(require_judgement(&manifest), &mut errors);
+        keep(different.map_err(Into::into), &mut errors);
+        let kept = keep(kept(campaign, &figures).map_err(Into::into), &mut errors);
+        let (graph, kept) = together(graph.zip(kept), errors, path)?;
         let fingerprint = fingerprint(campaign, &manifest, from.as_ref(), &graph);
         let (units, declared) = (units(&manifest.content), Mutex::default());
         Ok(Self { manifest, from, files: graph.files, figures, units, verdicts, kept, fingerprint, declared })
+    }
+
+    /// The campaign in `text`, which stands at `path`, and its base.
+    ///
+    /// # Errors
+    /// The faults of the campaign file, and beside them those of its manifest.
+    pub fn of_campaign(path: &Path, text: &str, registry: Registry) -> Result<(Campaign, Self)> {
+        let (campaign, faults) = Campaign::parse_partly(path, text)?;
+        let mut errors = Vec::new();
+        let base = campaign.as_ref().and_then(|campaign| keep(Self::read(campaign, registry), &mut errors));
+        if !faults.is_empty() {
+            keep(faults.finish(None::<()>).map_err(Into::into), &mut errors);
+            // The file that was named comes first.
+            errors.rotate_right(1);
+        }
+        together(campaign.zip(base), errors, path)
     }
 
     /// Values of `varied` for a drawn number: by key.
@@ -140,6 +160,31 @@ impl Base {
             None => self.manifest.overridden(sets),
         }
     }
+}
+
+/// The value that was read; the error is added to `errors`, if there is one.
+fn keep<T>(read: Result<T>, errors: &mut Vec<anyhow::Error>) -> Option<T> {
+    read.map_err(|error| errors.push(error)).ok()
+}
+
+/// `value`, which is there unless there are `errors`. An error without a place is one of the file at `path`.
+///
+/// # Errors
+/// The only error, or the faults of all errors as one.
+///
+/// # Panics
+/// If there is neither a value nor an error.
+pub fn together<T>(value: Option<T>, mut errors: Vec<anyhow::Error>, path: &Path) -> Result<T> {
+    if errors.len() == 1 {
+        return Err(errors.remove(0));
+    }
+    let mut faults = Faults::default();
+    for error in errors.into_iter().map(Error::from) {
+        let whole = || Diagnostic::in_file(path.display().to_string(), error.with_causes());
+        let fault = error.diagnostic().cloned().unwrap_or_else(whole);
+        faults.keep(Err::<(), _>(fault));
+    }
+    Ok(faults.finish(value)?)
 }
 
 /// The error of the override `set` of `key`, whose value nobody chose: without the value.

@@ -3,12 +3,16 @@
 use crate::distribution::Distribution;
 use crate::list::List;
 use crate::measures::Measures;
-use diagnostics::{Diagnostic, ParameterError, Place, read_toml};
+use diagnostics::parameter::require;
+use diagnostics::{Diagnostic, Faults, ParameterError, Place, read_toml};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
+/// Key of the duration of a run. Where it is varied, a measure may see some flights only.
+pub(crate) const DURATION: &str = "run.duration_s";
 /// Most flights of a campaign.
 pub const FLIGHTS_MAX: u64 = 1_000_000;
 
@@ -157,81 +161,71 @@ impl Campaign {
     /// The campaign in `text`, which stands at `path`.
     ///
     /// # Errors
-    /// A [`Diagnostic`] that names the place.
+    /// All faults, each with its place.
     pub fn parse(path: &Path, text: &str) -> Result<Self, Diagnostic> {
+        let (campaign, faults) = Self::parse_partly(path, text)?;
+        faults.finish(campaign)
+    }
+
+    /// The campaign in `text` without its faulty parts, and their faults. `None` if its manifest cannot be read beside these faults.
+    ///
+    /// # Errors
+    /// If the text is no campaign file at all.
+    pub(crate) fn parse_partly(path: &Path, text: &str) -> Result<(Option<Self>, Faults), Diagnostic> {
         let name = path.display().to_string();
         let file: File = read_toml(&name, text)?;
-        let at = |span: &std::ops::Range<usize>, error: ParameterError, help: &str| {
+        let at = |span: &Range<usize>, error: ParameterError, help: &str| {
             Diagnostic::at(Place::of(name.clone(), text, span), error).help(help)
         };
-        let vary = Diagnostic::gather(file.vary.iter().map(|vary| {
-            let place = Place::of(name.clone(), text, &vary.span());
-            Varied::of(vary.get_ref(), &place).map_err(|error| {
-                let help = "docs/campaigns.md lists the keys of [[vary]]";
-                let value = vary.get_ref().span_of(error.key());
-                let place = value.map_or(place, |span| Place::of(name.clone(), text, &span));
-                Diagnostic::at(place, error).help(help)
-            })
-        }))?;
-        require_names(&vary)?;
-        require_keys(&vary)?;
-        let flights = flights(&file, &vary).map_err(|error| {
+        let mut faults = Faults::default();
+        let vary = file.varied(&name, text);
+        let flights = match &vary {
+            // A grid counts its values.
+            Err(_) if file.sampling == Sampling::Grid => Ok(0),
+            vary => flights(&file, vary.as_deref().unwrap_or_default()),
+        };
+        let flights = faults.keep(flights.map_err(|error| {
             let span = file.flights.as_ref().map_or(0..0, Spanned::span);
             at(&span, error, "docs/campaigns.md lists the keys of a campaign")
-        })?;
-        require_dimensions(&file).map_err(|error| {
-            let span = file.vary.get(SOBOL_MAX).map_or(0..0, Spanned::span);
-            at(&span, error, "choose another `sampling`")
-        })?;
-        let timeout_s_host = file.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref());
-        if !(timeout_s_host > 0.0 && timeout_s_host <= TIMEOUT_S_HOST_MAX) {
-            let span = file.timeout_s_host.as_ref().map_or(0..0, Spanned::span);
-            let error =
-                ParameterError::value("timeout_s_host", "seconds above 0, at most a million", timeout_s_host);
-            return Err(at(&span, error, "leave it out for 60 s"));
-        }
-        let key_of = |set: &str| set.split('=').next().unwrap_or_default().trim().to_owned();
-        if let Some(set) = file.set.iter().find(|set| key_of(set.get_ref()) == "run.seed") {
-            let message = format!("`{}` in `set`: each flight has a seed of its own", set.get_ref());
-            let error = ParameterError::conflict("set", message);
-            return Err(at(&set.span(), error, "change `seed` of the campaign, or vary run.seed"));
-        }
-        let start = start(&file, path).map_err(|(span, error)| {
+        }));
+        faults.keep(file.check_values(&at));
+        let start = faults.keep(start(&file, path).map_err(|(span, error)| {
             at(&span, error, "name a manifest, or a checkpoint that all flights go on from")
-        })?;
-        if let (Start::Checkpoint(_), Some(measure)) = (&start, file.measure.first()) {
-            let name = measure.get_ref().get("name").map_or(String::new(), |name| format!(" {name}"));
-            let message = format!("[[measure]]{name} would see the flight from the checkpoint on only");
-            let error = ParameterError::conflict("measure", message);
-            return Err(at(&(0..0), error, "write it into the manifest, and write the checkpoint anew"));
-        }
+        }));
+        let has_measures = faults.keep(file.check_measures(&at)).is_some();
+        let vary = faults.keep(vary);
+        // A measure sees samples or none by the duration.
+        let has_duration = vary.is_some() || !file.keys().any(|key| key.get_ref() == DURATION);
+        let is_readable = has_measures && has_duration;
+        let Some(start) = start.filter(|_| is_readable) else { return Ok((None, faults)) };
         let measures = Measures::of(&name, text, &file.measure);
         let placed = |figure: &Spanned<String>| {
             (figure.get_ref().clone(), Place::of(name.clone(), text, &figure.span()))
         };
         let figures = file.figures.as_ref().map(|figures| figures.iter().map(placed).collect());
         let place = |span| Place::of(name.clone(), text, &span);
-        let varied =
-            file.vary.iter().map(Spanned::get_ref).flat_map(|vary| vary.key.iter().chain(&vary.keys));
-        let varied = varied.map(|key| (key.get_ref().clone(), place(key.span())));
-        let set_places =
-            file.set.iter().map(|set| (key_of(set.get_ref()), place(set.span()))).chain(varied).collect();
-        let set = file.set.into_iter().map(Spanned::into_inner).collect();
-        let (seed, sampling) = (file.seed, file.sampling);
-        let path = path.to_owned();
-        Ok(Self {
-            path,
+        let varied = file.keys().map(|key| (key.get_ref().clone(), place(key.span())));
+        let set_places = file
+            .set
+            .iter()
+            .map(|set| (key_of(set.get_ref()).to_owned(), place(set.span())))
+            .chain(varied)
+            .collect();
+        let timeout_s_host = file.timeout_s_host();
+        let campaign = Self {
+            path: path.to_owned(),
             start,
-            flights,
-            seed,
-            sampling,
-            set,
+            flights: flights.unwrap_or_default(),
+            seed: file.seed,
+            sampling: file.sampling,
+            set: file.set.into_iter().map(Spanned::into_inner).collect(),
             set_places,
             measures,
             figures,
-            vary,
+            vary: vary.unwrap_or_default(),
             timeout_s_host,
-        })
+        };
+        Ok((Some(campaign), faults))
     }
 
     /// True if a varied value sets `key`.
@@ -241,8 +235,72 @@ impl Campaign {
     }
 }
 
+impl File {
+    /// The varied values of the file called `name`, whose text is `text`.
+    fn varied(&self, name: &str, text: &str) -> Result<Vec<Varied>, Diagnostic> {
+        let vary = Diagnostic::gather(self.vary.iter().map(|vary| {
+            let place = Place::of(name, text, &vary.span());
+            Varied::of(vary.get_ref(), &place).map_err(|error| {
+                let help = "docs/campaigns.md lists the keys of [[vary]]";
+                let value = vary.get_ref().span_of(error.key());
+                let place = value.map_or(place, |span| Place::of(name, text, &span));
+                Diagnostic::at(place, error).help(help)
+            })
+        }))?;
+        Diagnostic::gather([require_names(&vary), require_keys(&vary)])?;
+        Ok(vary)
+    }
+
+    /// All keys that the file varies.
+    fn keys(&self) -> impl Iterator<Item = &Spanned<String>> {
+        self.vary.iter().map(Spanned::get_ref).flat_map(|vary| vary.key.iter().chain(&vary.keys))
+    }
+
+    fn timeout_s_host(&self) -> f64 {
+        self.timeout_s_host.as_ref().map_or(TIMEOUT_S_HOST, |it| *it.get_ref())
+    }
+
+    /// Refuses too many varied values, a host time out of range, and a seed for all flights.
+    fn check_values(&self, at: &At<'_>) -> Result<(), Diagnostic> {
+        let dimensions = require_dimensions(self).map_err(|error| {
+            let span = self.vary.get(SOBOL_MAX).map_or(0..0, Spanned::span);
+            at(&span, error, "choose another `sampling`")
+        });
+        let timeout_s_host = self.timeout_s_host();
+        let is_timeout = timeout_s_host > 0.0 && timeout_s_host <= TIMEOUT_S_HOST_MAX;
+        let expected = "seconds above 0, at most a million";
+        let timeout = require("timeout_s_host", timeout_s_host, is_timeout, expected).map_err(|error| {
+            let span = self.timeout_s_host.as_ref().map_or(0..0, Spanned::span);
+            at(&span, error, "leave it out for 60 s")
+        });
+        let seeds = self.set.iter().filter(|set| key_of(set.get_ref()) == "run.seed").map(|set| {
+            let message = format!("`{}` in `set`: each flight has a seed of its own", set.get_ref());
+            let error = ParameterError::conflict("set", message);
+            Err(at(&set.span(), error, "change `seed` of the campaign, or vary run.seed"))
+        });
+        Diagnostic::gather([dimensions, timeout].into_iter().chain(seeds)).map(drop)
+    }
+
+    /// Refuses measures of flights that go on from a checkpoint.
+    fn check_measures(&self, at: &At<'_>) -> Result<(), Diagnostic> {
+        let (Some(_), Some(measure)) = (&self.from, self.measure.first()) else { return Ok(()) };
+        let name = measure.get_ref().get("name").map_or(String::new(), |name| format!(" {name}"));
+        let message = format!("[[measure]]{name} would see the flight from the checkpoint on only");
+        let error = ParameterError::conflict("measure", message);
+        Err(at(&(0..0), error, "write it into the manifest, and write the checkpoint anew"))
+    }
+}
+
+/// The fault at a span of the file, with advice.
+type At<'a> = dyn Fn(&Range<usize>, ParameterError, &str) -> Diagnostic + 'a;
+
+/// Key of an override.
+fn key_of(set: &str) -> &str {
+    set.split('=').next().unwrap_or_default().trim()
+}
+
 /// The manifest or the checkpoint that the campaign `file` at `path` names; an error has its span.
-fn start(file: &File, path: &Path) -> Result<Start, (std::ops::Range<usize>, ParameterError)> {
+fn start(file: &File, path: &Path) -> Result<Start, (Range<usize>, ParameterError)> {
     let resolve = |written: &str| inputs::tidy(&path.parent().unwrap_or(Path::new("")).join(written));
     match (&file.manifest, &file.from) {
         (Some(manifest), None) => Ok(Start::Manifest(resolve(manifest.get_ref()))),
@@ -440,6 +498,23 @@ mod tests {
         let text = "sampling = \"grid\"\n[[vary]]\nkey = \"a\"\nvalues = [1, 2]\n[[vary]]\nkey = \"b\"\nintegers = [1, 3]";
         let campaign = parse(text).unwrap();
         assert_eq!((campaign.flights, campaign.sampling), (6, Sampling::Grid));
+    }
+
+    #[test]
+    fn all_faults_are_told_at_once() {
+        let text = "flights = 0\ntimeout_s_host = -1\nset = [\"run.seed=1\", \"run.seed=2\"]\n\
+                    [[vary]]\nkey = \"a\"\n[[vary]]\nkey = \"b\"\nuniform = [2, 1]";
+        let refused = parse(text).unwrap_err();
+        for place in ["c.toml:2:11", "c.toml:3:18", "c.toml:4:8", "c.toml:4:22", "c.toml:5:1", "c.toml:9:11"]
+        {
+            assert!(refused.contains(&format!("{place}: ")), "{place} in {refused}");
+        }
+        let vary = "[[vary]]\nkey = \"a.x\"\nvalues = [1]\n";
+        let refused = parse(&format!("{vary}{vary}")).unwrap_err();
+        for expected in ["missing key `flights`", "two varied values are called `x`", "`a.x` is varied twice"]
+        {
+            assert!(refused.contains(expected), "{expected} in {refused}");
+        }
     }
 
     #[test]

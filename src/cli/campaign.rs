@@ -7,8 +7,9 @@ use super::kind::Kind;
 use super::output::{print_json, print_text, say};
 use super::progress::{self, FlightLines};
 use anyhow::{Context, Result, bail};
-use campaign::base::Base;
+use campaign::base::{Base, together};
 use campaign::declaration::Campaign;
+use campaign::measures::changed;
 use campaign::page;
 use campaign::plan::Plan;
 use campaign::report::{Report, flights};
@@ -18,6 +19,7 @@ use campaign::store::{Builds, Header, PLAN, Store};
 use campaign::table::Table;
 use campaign::worker::{Job, Order, serve, take_output};
 use clap::Args;
+use diagnostics::Diagnostic;
 use hummingbus::COMPONENTS;
 use inputs::InputFiles;
 use report::summary::Summary;
@@ -180,8 +182,7 @@ impl Opened {
     /// The campaign, and the rows that were flown already.
     fn new(flying: Flying, builds: Builds) -> Result<(Self, BTreeMap<u64, Row>)> {
         let Flying { path, text, folder, .. } = &flying;
-        let campaign = Campaign::parse(path, text)?;
-        let base = Base::read(&campaign, COMPONENTS)?;
+        let (campaign, base) = Base::of_campaign(path, text, COMPONENTS)?;
         let header = Header {
             build: build()?,
             fingerprint: base.fingerprint.clone(),
@@ -366,6 +367,7 @@ fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> 
             all.min(CHECKED)
         ));
     }
+    let mut refusals = Vec::new();
     for (index, varied) in campaign.vary.iter().enumerate() {
         for choice in varied.distribution.choices().unwrap_or_default() {
             let is_chosen =
@@ -373,12 +375,28 @@ fn require_flyable(campaign: &Campaign, base: &Base, plan: &Plan) -> Result<()> 
             let chosen = (0..all).filter(is_chosen).take(CHECKED_OF_CHOICE);
             if let Some((flight, error)) = refusal(campaign, base, plan, chosen)? {
                 let name = &varied.name;
-                return Err(error)
-                    .context(format!("no flight with {choice} as `{name}` can be flown; flight {flight}"));
+                let about = format!("no flight with {choice} as `{name}` can be flown; flight {flight}");
+                refusals.push((error, about));
             }
         }
     }
-    Ok(())
+    require_none(refusals, &campaign.path)
+}
+
+/// Returns the `refusals`, each with what it is about, as one error.
+fn require_none(mut refusals: Vec<(anyhow::Error, String)>, campaign: &Path) -> Result<()> {
+    if refusals.len() == 1 {
+        let (error, about) = refusals.remove(0);
+        return Err(error.context(about));
+    }
+    let told = |(error, about): (anyhow::Error, String)| {
+        let of_choice = |mut fault: Diagnostic| {
+            fault.error = fault.error.of(about.as_str());
+            fault
+        };
+        changed(error, of_choice).context(about)
+    };
+    together(Some(()), refusals.into_iter().map(told).collect(), campaign)
 }
 
 /// The first of these flights with its error, if all of them are refused.

@@ -1,4 +1,5 @@
-//! Campaigns on a machine that fails: a full disk, workers and campaigns that are killed. What was flown is kept.
+//! Campaigns on a machine that fails: a full disk, workers and campaigns that are killed. What was flown is kept. Campaigns with
+//! several faults.
 
 use crate::campaign::{HOVERS, rows, written};
 use crate::support::{HUMMINGBUS, Launch, Place, poll};
@@ -96,4 +97,26 @@ fn a_full_disk_is_named_and_costs_no_row_that_was_written() {
     assert!((1..60).contains(&kept), "{kept}");
     place.call(&["campaign", &campaign, "--out", &out]).with_code(0).prints(&["60 of 60 flights passed"]);
     assert!(fs::read_to_string(&path).unwrap().starts_with(&whole));
+}
+
+#[test]
+fn the_faults_of_a_campaign_and_of_its_manifest_are_told_at_once() {
+    let place = Place::new();
+    let faulty = HOVERS.replace("flights = 12", "flights = 0").replace("[0.8, 1.2]", "[1.2, 0.8]");
+    let campaign = written(&place, "c.toml", &faulty);
+    let hover = fs::read_to_string(place.path("hover.toml")).unwrap();
+    let misspelt = hover.replace("period_ticks = 5", "period_tick = 5");
+    assert_ne!(misspelt, hover);
+    place.write("hover.toml", misspelt);
+    let out = place.path("out");
+    let told =
+        ["c.toml:2:11: `flights` must be", "`uniform` must be", "unknown key `process.mocap.period_tick`"];
+    place.call(&["campaign", &campaign, "--out", &out]).with_code(2).says(&told);
+    // Sound files, of which two choices are refused.
+    let kinds = "[[vary]]\nkey = \"process.controller.kind\"\nvalues = [\"pid\", \"pdi\", \"lrq\"]\n";
+    let text = HOVERS.replace("[[measure]]", &format!("{kinds}[[measure]]"));
+    let campaign = written(&place, "kinds.toml", &text);
+    let ended = place.call(&["campaign", &campaign, "--out", &out]).with_code(2);
+    ended.says(&["no flight with \"pdi\" as `kind`", "no flight with \"lrq\" as `kind`"]);
+    assert!(!std::path::Path::new(&out).exists(), "a folder for flights that are none");
 }
