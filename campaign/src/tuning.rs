@@ -2,6 +2,7 @@
 
 use crate::declaration::{Campaign, Sampling, require_line};
 use crate::draw::rounded_to;
+use diagnostics::parameter::{refuse, require};
 use diagnostics::{Diagnostic, ParameterError, Place, did_you_mean, nearest, read_toml};
 use serde::Deserialize;
 use std::ops::Range;
@@ -130,9 +131,10 @@ impl Tuning {
     /// The tuning in `text`, which stands at `path`.
     ///
     /// # Errors
-    /// A [`Diagnostic`] that names the place.
+    /// All faults, each with its place.
     pub fn parse(path: &Path, text: &str) -> Result<Self, Diagnostic> {
-        let campaign = Campaign::parse(path, text)?;
+        let (campaign, mut faults) = Campaign::parse_partly(path, text)?;
+        let Some(campaign) = campaign else { return faults.finish(None) };
         let name = path.display().to_string();
         let file: File = read_toml(&name, text)?;
         let at = |span: &Range<usize>, error: ParameterError| {
@@ -140,19 +142,25 @@ impl Tuning {
         };
         let Some(tune) = &file.tune else {
             let message = "there is no [tune] table: hummingbus tune needs it";
-            return Err(Diagnostic::in_file(name, message).help(HELP));
+            faults.keep::<()>(Err(Diagnostic::in_file(name, message).help(HELP)));
+            return faults.finish(None);
         };
         let (span, tune) = (tune.span(), tune.get_ref());
         if let Some((_, place)) = campaign.figures.iter().flatten().next() {
             let message = "the figures of a tuning are those of [[tune.minimise]]";
-            let error = ParameterError::conflict("figures", message);
-            return Err(Diagnostic::at(place.clone(), error).help("leave `figures` out"));
+            let error = ParameterError::conflict("figures", message).advised("leave `figures` out");
+            faults.keep::<()>(Err(Diagnostic::at(place.clone(), error)));
         }
-        let process = tune.check(&campaign).map_err(|error| at(&span, error))?;
+        let (process, errors) = tune.check(&campaign);
+        for error in errors {
+            faults.keep::<()>(Err(at(&span, error)));
+        }
         let place = |span: &Range<usize>| Place::of(name.clone(), text, span);
         let gains = Diagnostic::gather(tune.gain.iter().map(|gain| {
             Tuned::of(gain, &place).map_err(|error| Diagnostic::at(place(&gain.span()), error).help(HELP))
-        }))?;
+        }));
+        let gains = faults.keep(gains);
+        let (process, gains) = faults.finish(process.zip(gains))?;
         let terms = tune.minimise.iter().map(|term| Term {
             figure: term.figure.get_ref().clone(),
             weight: term.weight,
@@ -177,49 +185,46 @@ impl Tuning {
 }
 
 impl Tune {
-    /// The process whose gains are tuned.
-    fn check(&self, campaign: &Campaign) -> Result<String, ParameterError> {
-        let error = |key: &str, expected: &str, found: &dyn std::fmt::Display| {
-            Err(ParameterError::value(key, expected, found))
-        };
+    /// The process whose gains are tuned, and the errors of the table.
+    fn check(&self, campaign: &Campaign) -> (Option<String>, Vec<ParameterError>) {
         let process = self.gains.strip_prefix("process.").and_then(|rest| rest.strip_suffix(".gains"));
-        let Some(process) = process.filter(|process| !process.is_empty()) else {
-            return error("gains", "process.NAME.gains", &self.gains);
-        };
-        if campaign.sampling == Sampling::Grid {
-            let message = "a grid has no other flights to judge by; choose another `sampling`";
-            return Err(ParameterError::conflict("sampling", message));
-        }
-        if campaign.vary.iter().any(|varied| varied.keys.iter().any(|key| key == "run.seed")) {
-            let message = "run.seed is varied: a tuning judges by other seeds than it tunes by; leave it out";
-            return Err(ParameterError::conflict("vary", message));
-        }
-        if !(1..=crate::declaration::FLIGHTS_MAX).contains(&self.held_out) {
-            return error("held_out", "at least 1 flight", &self.held_out);
-        }
-        if self.generations == 0 {
-            return error("generations", "at least 1", &0);
-        }
-        if let Some(population) = self.population.filter(|it| !(4..=10_000).contains(it)) {
-            return error("population", "4 to 10000 candidates", &population);
-        }
-        if let Some(step) = self.step.filter(|step| !(*step > 0.0 && *step <= 1.0)) {
-            return error("step", "above 0 and at most 1", &step);
-        }
-        if !(self.failed_costs >= 0.0 && self.failed_costs.is_finite()) {
-            return error("failed_costs", "0 or more", &self.failed_costs);
-        }
-        if self.gain.is_empty() {
-            return Err(ParameterError::missing("gain", "at least one [[tune.gain]]"));
-        }
-        if self.minimise.is_empty() {
-            return Err(ParameterError::missing("minimise", "at least one [[tune.minimise]]"));
-        }
-        match self.minimise.iter().find(|term| !(term.weight > 0.0 && term.weight.is_finite())) {
-            Some(term) => error("weight", "above 0", &term.weight),
-            None => Ok(process.to_owned()),
-        }
+        let process = process.filter(|process| !process.is_empty()).map(str::to_owned);
+        let varies_seed = campaign.varies("run.seed");
+        let held_out = (1..=crate::declaration::FLIGHTS_MAX).contains(&self.held_out);
+        let costs = self.failed_costs >= 0.0 && self.failed_costs.is_finite();
+        let population = self
+            .population
+            .map(|it| require("population", it, (4..=10_000).contains(&it), "4 to 10000 candidates"));
+        let step =
+            self.step.map(|step| require("step", step, step > 0.0 && step <= 1.0, "above 0 and at most 1"));
+        let weights = self.minimise.iter().map(|term| {
+            require("weight", term.weight, term.weight > 0.0 && term.weight.is_finite(), "above 0")
+        });
+        let checks = [
+            require("gains", &self.gains, process.is_some(), "process.NAME.gains"),
+            refuse(
+                campaign.sampling == Sampling::Grid,
+                "sampling",
+                || "a grid has no other flights to judge by; choose another `sampling`",
+            ),
+            refuse(
+                varies_seed,
+                "vary",
+                || "run.seed is varied: a tuning judges by other seeds than it tunes by; leave it out",
+            ),
+            require("held_out", self.held_out, held_out, "at least 1 flight"),
+            require("generations", self.generations, self.generations > 0, "at least 1"),
+            require("failed_costs", self.failed_costs, costs, "0 or more"),
+            at_least_one("gain", self.gain.len(), "at least one [[tune.gain]]"),
+            at_least_one("minimise", self.minimise.len(), "at least one [[tune.minimise]]"),
+        ];
+        let all = checks.into_iter().chain(population).chain(step).chain(weights);
+        (process, all.filter_map(Result::err).collect())
     }
+}
+
+fn at_least_one(key: &str, count: usize, expected: &str) -> Result<(), ParameterError> {
+    if count > 0 { Ok(()) } else { Err(ParameterError::missing(key, expected)) }
 }
 
 impl Tuned {
@@ -404,6 +409,13 @@ mod tests {
         ] {
             let found = parse(&whole.replace(from, to)).unwrap_err();
             assert!(found.contains(expected), "{found}\nexpected {expected}");
+        }
+        // All at once, also those of the campaign.
+        let text = whole.replace("held_out = 2", "held_out = 0").replace("weight = 2", "weight = -1");
+        let found =
+            parse(&text.replace("flights = 2", "flights = 0").replace("[0.5, 2]", "[2, 0.5]")).unwrap_err();
+        for key in ["flights", "held_out", "weight", "factor"] {
+            assert!(found.contains(&format!("`{key}` must be")), "{key} in {found}");
         }
         let found = parse("manifest = \"a.toml\"\nflights = 2").unwrap_err();
         assert!(found.contains("there is no [tune] table"), "{found}");
