@@ -430,7 +430,9 @@ fn betaflight_flies_the_hover_and_its_doublet() {
     };
     let place = Place::new();
     let settings = [format!("process.controller.firmware={program}")];
-    for manifest in ["betaflight", "betaflight-swap", "betaflight-sticks"] {
+    for manifest in
+        ["betaflight", "betaflight-swap", "betaflight-sticks", "betaflight-hexa", "betaflight-octo"]
+    {
         let path = repository(&format!("manifests/autopilots/{manifest}.toml"));
         let [first, second] = ["a", "b"].map(|name| place.path(&format!("{manifest}-{name}.mcap")));
         for recording in [&first, &second] {
@@ -438,6 +440,63 @@ fn betaflight_flies_the_hover_and_its_doublet() {
         }
         require_same(&fs::read(&first).unwrap(), &second);
     }
+}
+
+/// The stand-in flies quadrotors alone: without the real firmware these two are checked, and not flown.
+#[test]
+fn the_hexacopter_and_the_octocopter_of_betaflight_pass_their_check() {
+    let place = Place::new();
+    let settings = stand_in(&place, "");
+    for manifest in ["betaflight-hexa", "betaflight-octo"] {
+        let path = repository(&format!("manifests/autopilots/{manifest}.toml"));
+        // The firmware alone: each has a configuration of its own.
+        let ended = call(&place, "check", &path, &settings[..1], &[]).with_code(0);
+        assert!(ended.error.is_empty(), "{ended}");
+    }
+}
+
+/// The Hummingbird with each rotor twice: one above, and below it one that turns the other way, each with half of the thrust.
+fn coaxial(place: &Place) -> String {
+    let given = |key: &str, value: f64, unit: &str| {
+        format!(
+            "{key} = {{ value = {value:e}, unit = \"{unit}\", source = \"a test\", uncertainty = \"exact\" }}\n"
+        )
+    };
+    let mut text =
+        format!("base = {:?}\nname = \"coaxial\"\n[rotor]\n", repository("vehicles/hummingbird.toml"));
+    text += &given("thrust_coefficient", 7.6184e-8 / 2.0, "N/rpm^2");
+    text += &given("torque_coefficient", 2.6839e-9 / 2.0, "N*m/rpm^2");
+    text += &given("inertia", 3.1e-5 / 2.0, "kg*m^2");
+    let arms = [("front", 0.17, 0.0), ("right", 0.0, -0.17), ("rear", -0.17, 0.0), ("left", 0.0, 0.17)];
+    let spins = ["clockwise", "counter-clockwise"];
+    for (level, z_m) in [("upper", 0.02), ("lower", -0.02)] {
+        for (number, (arm, x_m, y_m)) in arms.into_iter().enumerate() {
+            let spin = spins[(number + usize::from(level == "lower")) % 2];
+            text += &format!(
+                "[[rotors]]\nname = \"{level} {arm}\"\n\
+                 position = {{ value = [{x_m:?}, {y_m:?}, {z_m:?}], unit = \"m\", source = \"a test\", uncertainty = \"exact\" }}\n\
+                 spin = {{ value = \"{spin}\", source = \"a test\" }}\n"
+            );
+        }
+    }
+    place.write("coaxial.toml", text)
+}
+
+#[test]
+fn betaflight_flies_coaxial_pairs_as_it_flies_the_hummingbird() {
+    let Some(program) = variable_or_skip("HUMMINGBUS_BETAFLIGHT", "the program of Betaflight's SITL") else {
+        return;
+    };
+    let place = Place::new();
+    let vehicle = coaxial(&place);
+    let settings = [
+        format!("process.controller.firmware={program}"),
+        format!("process.controller.vehicle={vehicle}"),
+        format!("process.plant.vehicle={vehicle}"),
+        format!("process.plant.inputs.command.initial.command={:?}", [76.5; 8]),
+    ];
+    let recording = place.path("coaxial.mcap");
+    call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(0);
 }
 
 /// The hover and the doublet of both, by the conditions of both.
