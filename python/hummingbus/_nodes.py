@@ -21,18 +21,20 @@ class Optional:
 
 
 class Parameters(dict):
-    """The parameters that the manifest gives a node. One that the program does not read is refused; to look at all of them
-    (`items()`, `dict(parameters)`) reads all."""
+    """The parameters that the manifest gives a node, or a table of them. One that the program does not read is refused; to look at
+    all of them (`items()`, `dict(parameters)`) reads all. Of a table, too, all keys have to be read as soon as one is."""
 
-    def __init__(self, values: Mapping[str, Any]):
-        super().__init__(values)
+    def __init__(self, values: Mapping[str, Any], path: str = ""):
+        tables = {key: Parameters(value, f"{path}{key}.") if isinstance(value, dict) else value for key, value in values.items()}
+        super().__init__(tables)
+        self._path = path
         self._read: set[str] = set()
 
     def __getitem__(self, key: str) -> Any:
         self._read.add(key)
         if not super().__contains__(key):
-            known = ", ".join(f"`{name}`" for name in super().keys()) or "none"
-            raise _native.Error(f"parameters.{key} is missing; the manifest gives {known}")
+            known = ", ".join(f"`{self._path}{name}`" for name in super().keys()) or "none"
+            raise _native.Error(f"parameters.{self._path}{key} is missing; the manifest gives {known}")
         return super().__getitem__(key)
 
     def __iter__(self) -> Any:
@@ -56,10 +58,29 @@ class Parameters(dict):
         return super().get(key, default)
 
     def _require_all_read(self) -> None:
+        if unread := self._unread():
+            read = ", ".join(f"`{name}`" for name in self._names()) or "none"
+            raise _native.Error(f"parameters.{unread} is not read; the program reads {read}")
+
+    def _unread(self) -> str | None:
+        """The first key that the program has not read, with its tables."""
         for key in super().keys():
             if key not in self._read:
-                read = ", ".join(f"`{name}`" for name in sorted(self._read)) or "none"
-                raise _native.Error(f"parameters.{key} is not read; the program reads {read}")
+                return f"{self._path}{key}"
+            table = super().__getitem__(key)
+            # A table of which nothing was read is kept whole, perhaps for the steps.
+            if isinstance(table, Parameters) and table._read and (unread := table._unread()):
+                return unread
+        return None
+
+    def _names(self) -> list[str]:
+        """The keys that the program has read, with their tables."""
+        names = []
+        for key in sorted(self._read):
+            table = super().get(key)
+            within = table._names() if isinstance(table, Parameters) else []
+            names += within or [f"{self._path}{key}"]
+        return names
 
 
 @dataclass(frozen=True)

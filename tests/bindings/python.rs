@@ -293,6 +293,73 @@ fn what_goes_wrong_in_a_program_is_said_with_node_and_reason() {
 }
 
 #[test]
+fn a_check_and_a_run_refuse_a_program_whose_ports_and_parameters_do_not_fit() {
+    let Some(python) = python() else { return };
+    let run = "hb.run_node(step, inputs={'state': 'PlantState'}, outputs={'set_point': 'SetPoint'})\n";
+    let of_function = |from: &str, to: &str| {
+        assert!(run.contains(from), "{from}");
+        format!("def step(tick, state, set_point): pass\n{}", run.replace(from, to))
+    };
+    let of_class = |body: &str| {
+        format!(
+            "class Pilot(hb.Component):\n    inputs = {{'state': 'PlantState'}}\n    outputs = {{'set_point': 'SetPoint'}}\n\
+             \x20   def __init__(self, node):\n        {body}\n    def step(self, tick, state, set_point): pass\nhb.run_node(Pilot)\n"
+        )
+    };
+    let gains = "parameters = { gains = { rol = 1.0, yaw = 2.0 } }\n";
+    let cases = [
+        (of_function("'state'", "'stat'"), "", "declares the input `stat`, which the manifest does not wire"),
+        (of_function("'state': 'PlantState'", ""), "", "the input `state`, which the node does not declare"),
+        (of_function("'set_point'", "'points'"), "", "declares the output `points`"),
+        (of_function("'SetPoint'", "'MotorCommand'"), "", "publishes hummingbus_msgs/msg/MotorCommand"),
+        (of_function("'PlantState'", "'Imu'"), "", "/plant/state"),
+        (of_function("'SetPoint'", "'Nothing'"), "", "there is no message Nothing"),
+        (of_function("", ""), gains, "parameters.gains is not read; the program reads none"),
+        (of_class("node.parameters['gains']['pitch']"), gains, "parameters.gains.pitch is missing"),
+        (
+            of_class("gains = node.parameters['gains']; gains['yaw'], gains.get('roll', 1.0)"),
+            gains,
+            "parameters.gains.rol is not read; the program reads `gains.roll`, `gains.yaw`",
+        ),
+    ];
+    let mut wrong = String::new();
+    for (number, (code, parameters, words)) in cases.iter().enumerate() {
+        let place = Place::new();
+        let manifest = hover(&place, code, parameters);
+        for command in ["check", "run"] {
+            let ended = python.call(&place, &[command, &manifest]);
+            if ended.code != Some(2) || !ended.error.contains(words) {
+                wrong += &format!("case {number}, {command}: no {words:?} in\n{ended}\n");
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// Its keys may be read at any step.
+#[test]
+fn a_table_of_parameters_may_be_kept_whole() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let code = "\
+class Pilot(hb.Component):
+    outputs = {'set_point': 'SetPoint'}
+    inputs = {'state': 'PlantState'}
+    def __init__(self, node): self.asked = node.parameters['asked']
+    def step(self, tick, state, set_point): set_point['altitude'] = self.asked['altitude_m']
+hb.run_node(Pilot)
+";
+    let manifest = hover(&place, code, "parameters = { asked = { altitude_m = 1.25, spare = 0 } }\n");
+    python.call(&place, &["check", &manifest]).with_code(0);
+    fly(python, &place, &manifest).flown();
+    let recording = place.path("flight.mcap");
+    let last = python.eval(&format!(
+        "import hummingbus as hb\nprint(hb.Recording({recording:?}).numpy('/pilot/set_point', ['altitude'])['altitude'][-1])"
+    ));
+    assert_eq!(last, "1.25\n");
+}
+
+#[test]
 fn a_step_that_blocks_is_ended_by_the_watchdog_with_its_tick() {
     let Some(python) = python() else { return };
     let place = Place::new();
