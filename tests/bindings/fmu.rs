@@ -283,6 +283,31 @@ fn arrays_and_integers_pass_through_one_in_c() {
     assert_eq!(passed[4 * 1199 + 3], 1.0, "the seconds of the last stamp");
 }
 
+/// A process of 200 Hz in a run of 1 kHz: the FMU steps over 5 ms from its own time 0 on, and its ticks are in the profile.
+#[test]
+fn an_fmu_steps_over_the_period_of_its_process() {
+    let place = Place::new();
+    let ports = "period_ticks = 5\noutputs.command = { type = \"hummingbus_msgs/msg/MotorCommand\" }\n\
+                 outputs.set_point = { type = \"hummingbus_msgs/msg/SetPoint\" }\n";
+    let mapped =
+        MAPPED.replace("command.command\"", "command.command\", reached_us = \"set_point.altitude\"");
+    let manifest = beside(&place, &native(&place), ports, &mapped);
+    let recording = place.path("flight.mcap");
+    let args = ["run", &manifest, "--record", &recording, "--set", "run.profile=true", "--json"];
+    let summary = place.call(&args).with_code(0).json();
+    let nodes = summary["profile"]["nodes"].as_array().unwrap();
+    let still = nodes.iter().find(|node| node["name"] == "still").unwrap();
+    assert_eq!(still["compute"]["count"], 240, "{summary}");
+    let reached_us = column(&place, "flight.mcap", "/still/set_point", "altitude");
+    assert_eq!(reached_us, (1..=240).map(|step| 5000.0 * f64::from(step)).collect::<Vec<_>>());
+    let (heights, passed) = (
+        column(&place, "flight.mcap", "/plant/state", "position.z"),
+        commands(&place, "flight.mcap", "/still/command"),
+    );
+    let read: Vec<f64> = passed.chunks(4).map(|passed| passed[2]).collect();
+    assert_eq!(read, heights.into_iter().step_by(5).collect::<Vec<_>>(), "the newest samples of its ticks");
+}
+
 /// The page's manifest, with the FMU in C under the page's names.
 #[test]
 fn the_manifest_of_the_page_passes_its_check() {
@@ -393,7 +418,7 @@ fn what_does_not_fit_is_said_by_check_with_its_key() {
         (
             "",
             format!("{MAPPED}state_bytes = 8\n"),
-            "there is room for 8; give parameters.state_bytes, at least 48",
+            "there is room for 8; give parameters.state_bytes, at least 56",
         ),
         ("", format!("{MAPPED}colour = 1\n"), "colour"),
         ("period_ticks = 1\nlog = \"no/such/folder/x.log\"\n", MAPPED.to_owned(), "no/such/folder"),

@@ -5,12 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { POSITION = 1, SECONDS = 2, PASSED = 3, STEPS = 4, CRASH_AT = 5, NEGATIVE = 6, WEIGHT = 7 };
+enum { POSITION = 1, SECONDS = 2, PASSED = 3, STEPS = 4, CRASH_AT = 5, NEGATIVE = 6, WEIGHT = 7, REACHED_US = 9 };
 
 struct model {
   double position[3];
   int32_t seconds;
   uint64_t steps, crash_at;
+  int64_t reached_us; /* Its time. */
 };
 
 typedef void log_message(void *, int, const char *, const char *);
@@ -40,6 +41,7 @@ int fmi3DoStep(void *instance, double time, double step, bool final, bool *event
     *(volatile int *)NULL = 1;
   }
   *reached = time + step;
+  model->reached_us = (int64_t)(1e6 * *reached + 0.5);
   return 0;
 }
 
@@ -94,6 +96,14 @@ int fmi3GetInt16(void *instance, const uint32_t *references, size_t count, int16
   return 0;
 }
 
+int fmi3GetInt64(void *instance, const uint32_t *references, size_t count, int64_t *values, size_t length) {
+  if (count != 1 || references[0] != REACHED_US) {
+    return 3;
+  }
+  values[0] = ((struct model *)instance)->reached_us;
+  return 0;
+}
+
 int fmi3GetFMUState(void *instance, void **state) {
   *state = malloc(sizeof(struct model));
   memcpy(*state, instance, sizeof(struct model));
@@ -132,7 +142,6 @@ int fmi3DeserializeFMUState(void *instance, const uint8_t *bytes, size_t size, v
   int name(void *model, const uint32_t *references, size_t count, type *values, size_t length) { return 3; }
 REFUSED(fmi3GetFloat32, float)
 REFUSED(fmi3SetFloat32, const float)
-REFUSED(fmi3GetInt64, int64_t)
 REFUSED(fmi3SetInt64, const int64_t)
 REFUSED(fmi3SetInt16, const int16_t)
 REFUSED(fmi3GetInt8, int8_t)
