@@ -19,6 +19,7 @@ use bus::plan::{NodePlan, Plan};
 use bus::ports::Inputs;
 use diagnostics::{Diagnostic, Error};
 use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ExitStatus};
 use std::time::Duration;
@@ -176,20 +177,33 @@ fn answer(
         Some(status) => format!("it ended with {status}"),
         None => format!("it did not report its ports within {} ms", program.watchdog.as_millis()),
     };
-    let mut help = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
-    match ended {
-        Some(_) if !said.is_empty() => {
-            let advice =
-                advice_on(&words).unwrap_or("its output says what to change in the manifest or the program");
-            advice.clone_into(&mut help);
-        }
-        Some(_) => {}
-        None => help.push_str("; one that needs longer to start has a longer `watchdog_ms_host`"),
-    }
+    let help = advice(program, ended, &words);
     let said = if said.is_empty() { said } else { format!("\n  {said}") };
     let message = format!("process `{}` would not take part in a run: {fault}{said}", plan.name);
     let at = named_parameter(&message).unwrap_or_default().to_owned();
     Err(problem(manifest, &plan.name, &at, message, &help).into())
+}
+
+/// Advice on `program`, which did not report its ports: its end, if it has ended, and the lines that it wrote last.
+fn advice(program: &Program, ended: Option<ExitStatus>, words: &[String]) -> String {
+    let how = format!("{HOW_TO_JOIN}; a program that takes no part is `lockstep = false`");
+    let Some(status) = ended else {
+        return format!("{how}; one that needs longer to start has a longer `watchdog_ms_host`");
+    };
+    if words.iter().any(|line| !line.is_empty()) {
+        let advice = advice_on(words);
+        return advice.unwrap_or("its output says what to change in the manifest or the program").to_owned();
+    }
+    match (status.signal(), program.kind()) {
+        (Some(_), Some(kind)) => format!(
+            "`{kind}` crashed in the library that it loads, as it would in a run: export the library anew, or report the crash to \
+             the makers of its tool"
+        ),
+        (Some(_), None) => {
+            "the program crashed before it had declared its ports: start it in a debugger".to_owned()
+        }
+        (None, _) => how,
+    }
 }
 
 /// The end of a process; `None` if it goes on at `end_ns`.

@@ -107,6 +107,11 @@ fn a_program_that_takes_no_part_is_refused_and_none_is_started_where_that_is_ask
     assert!(ended.error.is_empty(), "{ended}");
     let failing = hover(&place, &custom(INPUTS, TILT), &silent.replace("true", "false"));
     place.call(&["check", &failing]).with_code(2).says(&["process `pilot` would not take part in a run"]);
+    let crash = silent.replace("\"true\"", "\"sh\", \"-c\", \"kill -SEGV $$\"");
+    let crashing = hover(&place, &custom(INPUTS, TILT), &crash);
+    let words =
+        ["it ended with signal: 11 (SIGSEGV)", "the program crashed before it had declared its ports"];
+    place.call(&["check", &crashing]).with_code(2).says(&words);
 }
 
 #[test]

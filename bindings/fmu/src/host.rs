@@ -163,7 +163,8 @@ impl Host {
             return Err(format!("`parameters.state_bytes` is {room}; expected at most {STATE_BYTES_MAX}"));
         }
         if saves_state {
-            prove(&make, &description, parameters, period_s)?;
+            let found = prove(&make, &description, parameters, period_s)?;
+            require_room(found, room)?;
         }
         let state = saves_state
             .then(|| SavedState { configuration: configuration(&bytes, &parameters.start, period_s), room });
@@ -187,13 +188,9 @@ impl Host {
         let found = state.len();
         // Also of a state that does not fit, for whoever loads it.
         head[8..].copy_from_slice(&(found as u64).to_le_bytes());
-        let Some(place) = room.get_mut(..found) else {
-            return Err(format!(
-                "the FMU's state has {found} bytes, and there is room for {}; give parameters.state_bytes, at least {found}",
-                room.len()
-            ));
-        };
-        place.copy_from_slice(&state);
+        // It may have grown since the proof.
+        require_room(found, room.len())?;
+        room[..found].copy_from_slice(&state);
         Ok(())
     }
 }
@@ -252,6 +249,16 @@ impl Program for Host {
         }
         Ok(())
     }
+}
+
+/// Refuses a state of `found` bytes for which there is no room.
+fn require_room(found: usize, room: usize) -> Result<(), String> {
+    if found <= room {
+        return Ok(());
+    }
+    Err(format!(
+        "the FMU's state has {found} bytes, and there is room for {room}; give parameters.state_bytes, at least {found}"
+    ))
 }
 
 /// Hash of an FMU, its start values and its period. Start values are part of its state, and its time is
@@ -358,13 +365,13 @@ fn saves_state(description: &Description, asked: Option<bool>) -> Result<bool, S
     }
 }
 
-/// Replays the FMU from a state that it saved.
+/// Replays the FMU from a state that it saved; returns the number of bytes of the state.
 fn prove(
     make: &dyn Fn() -> Result<Box<dyn Instance>, String>,
     description: &Description,
     parameters: &Parameters,
     period_s: f64,
-) -> Result<(), String> {
+) -> Result<usize, String> {
     let probe = |name: &String| -> Result<Probe, String> {
         let variable = wiring::find(description, name)?;
         let values = library::values_of(variable, description.version)?;

@@ -21,7 +21,7 @@ pub struct Probe {
 }
 
 /// Steps `first`, saves its state and replays it: on the instance itself, and on another one of `make`.
-/// `inputs` are set to different values at each step, `outputs` are compared.
+/// `inputs` are set to different values at each step, `outputs` are compared. Returns the number of bytes of the state.
 ///
 /// # Errors
 /// Reason why the state is not to be trusted, with what was found.
@@ -31,7 +31,7 @@ pub fn replay(
     period_s: f64,
     inputs: &[Probe],
     outputs: &[Probe],
-) -> Result<(), String> {
+) -> Result<usize, String> {
     let flown = |reason| format!("it fails when it is stepped from its start values: {reason}");
     let inputs = &started(&*first, inputs).map_err(flown)?;
     run(&*first, period_s, 0, inputs, outputs).map_err(flown)?;
@@ -41,7 +41,8 @@ pub fn replay(
     same(&after, &run(&*first, period_s, STEPS, inputs, outputs)?, "the same instance")?;
     let second = make()?;
     second.restore(&state)?;
-    same(&after, &run(&*second, period_s, STEPS, inputs, outputs)?, "another instance")
+    same(&after, &run(&*second, period_s, STEPS, inputs, outputs)?, "another instance")?;
+    Ok(state.len())
 }
 
 /// The inputs with the values that the FMU has given them.
@@ -166,7 +167,7 @@ mod tests {
         }
     }
 
-    fn proved(is_forgetful: bool) -> Result<(), String> {
+    fn proved(is_forgetful: bool) -> Result<usize, String> {
         let probe = |name: &str| Probe {
             reference: 1,
             name: name.to_owned(),
@@ -181,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_state_that_leaves_something_out_is_found() {
-        assert_eq!(proved(false), Ok(()));
+        assert_eq!(proved(false), Ok(8), "bytes of the state");
         let reason = proved(true).unwrap_err();
         assert!(
             reason.contains("in the same instance, `y` is ") && reason.contains("at step 200"),
