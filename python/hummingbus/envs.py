@@ -30,8 +30,9 @@ outputs.command = {{}}
 class HoverEnv(gymnasium.Env):
     """Hold a place in the air with the commands of the rotors, from a start nearby.
 
-    An action is a number from -1 to 1 for each rotor: its command is `hover + span * action`, in the unit of the vehicle
-    file, for `action_ticks` ms. An observation is 13 doubles: the way to the target (m), velocity (m/s), attitude (quaternion
+    `vehicle` is a vehicle file with any number of rotors; without it, the Hummingbird flies. An action is a number from -1 to 1
+    for each rotor: its command is `hover + span * action`, in the unit of the vehicle file, for `action_ticks` ms. Without
+    these two, `hover` is the command at which the vehicle hovers, and `span` a fifth of the range of its commands. An observation is 13 doubles: the way to the target (m), velocity (m/s), attitude (quaternion
     x, y, z, w), and angular velocity in the body (rad/s). The reward of a step lies between -1 and 1: 1 at rest at the target.
     An episode ends when the vehicle is farther than 2 m from the target, lies below the ground or on its side.
     """
@@ -42,9 +43,8 @@ class HoverEnv(gymnasium.Env):
         self,
         vehicle: str | os.PathLike[str] | None = None,
         *,
-        rotors: int = 4,
-        hover: float = 76.5,
-        span: float = 40.0,
+        hover: float | None = None,
+        span: float | None = None,
         action_ticks: int = 10,
         duration_s: float = 10.0,
         target_m: tuple[float, float, float] = (0.0, 0.0, 1.0),
@@ -54,8 +54,11 @@ class HoverEnv(gymnasium.Env):
         if vehicle is None:
             vehicle = Path(self._folder.name) / "hummingbird.toml"
             vehicle.write_text(_native.REFERENCE_VEHICLE)
-        text = _HOVER.format(vehicle=_quoted(os.path.abspath(vehicle)), hover=[hover] * rotors)
-        self._text, self._rotors, self._hover, self._span = text, rotors, hover, span
+        rotors, at_hover, least, most = _native.motors(vehicle)
+        self._hover = at_hover if hover is None else hover
+        self._span = (most - least) / 5.0 if span is None else span
+        self._text = _HOVER.format(vehicle=_quoted(os.path.abspath(vehicle)), hover=[self._hover] * rotors)
+        self._rotors = rotors
         self._action_ticks, self._duration_s = action_ticks, duration_s
         self._target, self._start_within = np.array(target_m), start_within_m
         self._command = message("MotorCommand").zeros()

@@ -7,6 +7,7 @@ mod node;
 mod places;
 mod recording;
 mod simulation;
+mod vehicle;
 
 use pyo3::prelude::*;
 
@@ -21,5 +22,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::Simulation>()?;
     module.add("REFERENCE_VEHICLE", hummingbus::vehicles::reference::HUMMINGBIRD)?;
     module.add_function(wrap_pyfunction!(message::messages, module)?)?;
-    module.add_function(wrap_pyfunction!(message::message, module)?)
+    module.add_function(wrap_pyfunction!(message::message, module)?)?;
+    module.add_function(wrap_pyfunction!(vehicle::motors, module)?)
 }

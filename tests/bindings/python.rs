@@ -511,7 +511,7 @@ fn an_identification_returns_the_report_of_a_flight_that_python_has_flown() {
 fn the_stubs_have_the_names_of_the_library() {
     let Some(python) = python() else { return };
     python.eval(
-        "import ast\nfrom hummingbus import _native\n\
+        "import ast, inspect\nfrom hummingbus import _native\n\
          def names(body):\n\
          \x20   found = {n.target.id if isinstance(n, ast.AnnAssign) else n.name: n for n in body if not isinstance(n, (ast.ImportFrom, ast.Expr))}\n\
          \x20   return {name: node for name, node in found.items() if not name.startswith('__')}\n\
@@ -520,7 +520,18 @@ fn the_stubs_have_the_names_of_the_library() {
          assert public(_native) == set(stubs), public(_native) ^ set(stubs)\n\
          for name in ('Node', 'Recording', 'Saved', 'Simulation'):\n\
          \x20   stub, found = set(names(stubs[name].body)), public(getattr(_native, name))\n\
-         \x20   assert stub == found, (name, stub ^ found)",
+         \x20   assert stub == found, (name, stub ^ found)\n\
+         # Parameters have the same names in the same order.\n\
+         def require_same(stub, found):\n\
+         \x20   declared = [argument.arg for argument in stub.args.args if argument.arg != 'self']\n\
+         \x20   known = [name for name in inspect.signature(found).parameters if name != 'self']\n\
+         \x20   assert declared == known, (stub.name, declared, known)\n\
+         for name, stub in stubs.items():\n\
+         \x20   if isinstance(stub, ast.FunctionDef): require_same(stub, getattr(_native, name))\n\
+         \x20   for method in getattr(stub, 'body', []) if isinstance(stub, ast.ClassDef) else []:\n\
+         \x20       if not isinstance(method, ast.FunctionDef) or method.decorator_list: continue\n\
+         \x20       of_class = getattr(_native, name)\n\
+         \x20       require_same(method, of_class if method.name == '__init__' else getattr(of_class, method.name))",
     );
 }
 
@@ -643,6 +654,7 @@ fn an_environment_is_what_gymnasium_expects_and_a_seed_gives_the_same_episode() 
     python.eval(
         "import numpy as np, warnings\n\
          from gymnasium.utils.env_checker import check_env\n\
+         import hummingbus as hb\n\
          from hummingbus.envs import HoverEnv\n\
          with warnings.catch_warnings():\n\
          \x20   warnings.filterwarnings('ignore', message='.*Box observation space (min|max)imum value is -?inf.*')\n\
@@ -675,6 +687,18 @@ fn an_environment_is_what_gymnasium_expects_and_a_seed_gives_the_same_episode() 
          assert observation[5] > 0.1 and abs(observation[3]) < 1e-9 and observation[2] < 0, observation\n\
          env.reset(options={'position_m': [0, 0, 1]})\n\
          for _ in range(40): observation, *_ = env.step(np.array([-0.05, 0, 0.05, 0]))\n\
-         assert observation[3] > 0.01 and observation[7] > 0, observation",
+         assert observation[3] > 0.01 and observation[7] > 0, observation\n\
+         # Vehicles with other commands and numbers of rotors hover as they are.\n\
+         for vehicle, rotors in (('crazyflie-2.1', 4), ('dji-f550', 6), ('tarot-t18', 8)):\n\
+         \x20   env = HoverEnv(f'vehicles/{vehicle}.toml')\n\
+         \x20   assert env.action_space.shape == (rotors,), (vehicle, env.action_space)\n\
+         \x20   env.reset(options={'position_m': [0, 0, 1]})\n\
+         \x20   for _ in range(50): observation, *_ = env.step(np.zeros(rotors))\n\
+         \x20   assert abs(observation[:6]).max() < 0.01, (vehicle, observation)\n\
+         \x20   for _ in range(20): observation, *_ = env.step(np.ones(rotors))\n\
+         \x20   assert observation[5] > 0.1, (vehicle, observation)\n\
+         try: HoverEnv('vehicles/nothing.toml')\n\
+         except hb.Error as error: assert 'vehicles/nothing.toml' in str(error), error\n\
+         else: raise AssertionError",
     );
 }
