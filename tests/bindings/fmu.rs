@@ -283,7 +283,7 @@ fn arrays_and_integers_pass_through_one_in_c() {
     assert_eq!(passed[4 * 1199 + 3], 1.0, "the seconds of the last stamp");
 }
 
-/// A process of 200 Hz in a run of 1 kHz: the FMU steps over 5 ms from its own time 0 on, and its ticks are in the profile.
+/// A process of 200 Hz in a run of 1 kHz: the FMU steps over 5 ms, from its own time 0 on. Its ticks are in the profile.
 #[test]
 fn an_fmu_steps_over_the_period_of_its_process() {
     let place = Place::new();

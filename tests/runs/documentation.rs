@@ -2,7 +2,7 @@
 
 use crate::refusals::good;
 use crate::support::{HUMMINGBUS, Place, repository};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -158,6 +158,31 @@ fn every_manifest_is_named_in_the_scenarios() {
         let name = entry.unwrap().file_name().to_string_lossy().into_owned();
         let is_named = scenarios.contains(&format!("`{name}`"));
         assert!(!name.ends_with(".toml") || is_named, "docs/scenarios.md does not name {name}");
+    }
+}
+
+/// The table of languages states how long each example is; the pages of C++ and Python do, too.
+#[test]
+fn the_examples_in_other_languages_have_the_stated_numbers_of_lines() {
+    let readme = fs::read_to_string(repository("README.md")).unwrap();
+    let mut lengths = BTreeMap::new();
+    for row in readme.lines().filter_map(|line| Some(line.split_once(" lines |")?.0)) {
+        let (link, stated) = row.rsplit_once(", ").unwrap();
+        let path = link.rsplit_once('(').unwrap().1.trim_end_matches(')').to_owned();
+        let found = fs::read_to_string(repository(&path)).unwrap().lines().count();
+        assert_eq!(stated.parse(), Ok(found), "README.md states {stated} lines of {path}");
+        lengths.insert(path, found);
+    }
+    assert_eq!(lengths.len(), 4, "{lengths:?}");
+    for (page, example, most) in [
+        ("docs/cpp.md", "examples/cpp/controller.cpp", 60),
+        ("docs/python.md", "examples/python/controller.py", 70),
+    ] {
+        let text = fs::read_to_string(repository(page)).unwrap();
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let length = lengths[example];
+        assert!(length <= most, "{example} has {length} lines, at most {most} are an example");
+        assert!(words.contains(&format!("in {length} lines")), "{page} states another length of {example}");
     }
 }
 

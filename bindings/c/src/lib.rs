@@ -5,6 +5,8 @@
 
 mod guard;
 mod message;
+#[cfg(test)]
+mod misuse_tests;
 mod node;
 mod parameter_calls;
 mod parameters;
