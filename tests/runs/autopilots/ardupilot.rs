@@ -4,8 +4,9 @@
 use super::{a_lost_radio_reaches_the_firmware, call, compiled, each_flies_its_own, files_are_attached};
 use crate::recordings::{require_same, topics};
 use crate::skipped::{cases, first, is_left, variable_or_skip};
-use crate::support::{Place, poll, repository};
+use crate::support::{HUMMINGBUS, Place, poll, repository};
 use std::fs;
+use std::process::Command;
 use std::sync::OnceLock;
 
 /// The manifest of the hover and the doublet.
@@ -216,6 +217,33 @@ fn a_checkpoint_of_an_ardupilot_is_refused_in_words() {
     call(&place, "run", &manifest(), &stand_in(&place, ""), &planned)
         .with_code(2)
         .says(&["at tick 500", says]);
+}
+
+/// Exit code and output of `scripts/firmware-check` with `firmware` as the program of ArduCopter's SITL.
+fn firmware_check(place: &Place, firmware: &str) -> (Option<i32>, String) {
+    let mut script = Command::new(repository("scripts/firmware-check"));
+    script.arg(HUMMINGBUS).env("HUMMINGBUS_ARDUPILOT", firmware);
+    script.env_remove("HUMMINGBUS_BETAFLIGHT").env_remove("HUMMINGBUS_PX4");
+    let ended = place.mark(&mut script).output().unwrap();
+    let text =
+        [ended.stdout, ended.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    (ended.status.code(), text)
+}
+
+#[test]
+fn the_check_of_firmware_flies_each_manifest_twice_and_fails_where_one_does() {
+    let place = Place::new();
+    let (code, text) = firmware_check(&place, "/bin/ls");
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("ardupilot: the run aborted with exit code 2"), "{text}");
+    assert!(text.contains("ardupilot: not compared, a recording is missing"), "{text}");
+    if is_left("three flights with a rest of 45 s; nothing else runs the script to its end") {
+        return;
+    }
+    let (code, text) = firmware_check(&place, &place.write("arducopter", program()));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(text.matches("ardupilot: passed, ").count(), 3, "{text}");
+    assert!(text.contains("ardupilot: twice the same bytes"), "{text}");
 }
 
 #[test]
