@@ -7,7 +7,10 @@ mod px4;
 use crate::recordings::{open, require_same};
 use crate::skipped::{cases, is_left, variable_or_skip};
 use crate::support::{Ended, Place, repository};
+use ::autopilots::betaflight::mixers::MIXERS;
+use ::autopilots::layout::Motor;
 use serde_json::{Value, json};
+use std::f64::consts::SQRT_2;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -455,48 +458,76 @@ fn the_hexacopter_and_the_octocopter_of_betaflight_pass_their_check() {
     }
 }
 
-/// The Hummingbird with each rotor twice: one above, and below it one that turns the other way, each with half of the thrust.
-fn coaxial(place: &Place) -> String {
-    let given = |key: &str, value: f64, unit: &str| {
-        format!(
-            "{key} = {{ value = {value:e}, unit = \"{unit}\", source = \"a test\", uncertainty = \"exact\" }}\n"
-        )
-    };
-    let mut text =
-        format!("base = {:?}\nname = \"coaxial\"\n[rotor]\n", repository("vehicles/hummingbird.toml"));
-    text += &given("thrust_coefficient", 7.6184e-8 / 2.0, "N/rpm^2");
-    text += &given("torque_coefficient", 2.6839e-9 / 2.0, "N*m/rpm^2");
-    text += &given("inertia", 3.1e-5 / 2.0, "kg*m^2");
-    let arms = [("front", 0.17, 0.0), ("right", 0.0, -0.17), ("rear", -0.17, 0.0), ("left", 0.0, 0.17)];
-    let spins = ["clockwise", "counter-clockwise"];
-    for (level, z_m) in [("upper", 0.02), ("lower", -0.02)] {
-        for (number, (arm, x_m, y_m)) in arms.into_iter().enumerate() {
-            let spin = spins[(number + usize::from(level == "lower")) % 2];
+/// The shipped vehicle that has as many rotors as a mixer has `motors`, its arm in metres, and the manifest that flies it. Four coaxial pairs
+/// are a Hummingbird with each rotor twice. In an X of four arms all of them make roll, in a plus two: shorter arms make the same torque.
+fn like_mixer(motors: &[Motor]) -> (&'static str, f64, &'static str) {
+    let is_x = motors[0].0 % 90.0 != 0.0;
+    match (motors.len(), has_pairs(motors)) {
+        (6, _) => ("dji-f550", 0.27, "betaflight-hexa"),
+        (8, false) => ("tarot-t18", 0.635, "betaflight-octo"),
+        _ => ("hummingbird", if is_x { 0.17 / SQRT_2 } else { 0.17 }, "betaflight"),
+    }
+}
+
+/// True if two motors are on one arm.
+fn has_pairs(motors: &[Motor]) -> bool {
+    motors.iter().enumerate().any(|(number, motor)| motors[..number].iter().any(|other| other.0 == motor.0))
+}
+
+/// A vehicle file with rotors that stand and turn as `motors` do; the rest is that of the vehicle `base`.
+fn vehicle_of_mixer(place: &Place, name: &str, motors: &[Motor], base: &str, arm_m: f64) -> String {
+    let mut text = format!("base = {:?}\nname = {name:?}\n", repository(&format!("vehicles/{base}.toml")));
+    if base == "hummingbird" && motors.len() == 8 {
+        let halves = [
+            ("thrust_coefficient", 7.6184e-8 / 2.0, "N/rpm^2"),
+            ("torque_coefficient", 2.6839e-9 / 2.0, "N*m/rpm^2"),
+            ("inertia", 3.1e-5 / 2.0, "kg*m^2"),
+        ];
+        text += "[rotor]\n";
+        for (key, value, unit) in halves {
             text += &format!(
-                "[[rotors]]\nname = \"{level} {arm}\"\n\
-                 position = {{ value = [{x_m:?}, {y_m:?}, {z_m:?}], unit = \"m\", source = \"a test\", uncertainty = \"exact\" }}\n\
-                 spin = {{ value = \"{spin}\", source = \"a test\" }}\n"
+                "{key} = {{ value = {value:e}, unit = {unit:?}, source = \"a test\", uncertainty = \"exact\" }}\n"
             );
         }
     }
-    place.write("coaxial.toml", text)
+    for (number, (angle_deg, is_clockwise)) in motors.iter().enumerate() {
+        let (right, front) = libm::sincos(angle_deg.to_radians());
+        let stands_there = |other: &Motor| other.0 == *angle_deg;
+        let [is_lower, is_upper] =
+            [&motors[..number], &motors[number + 1..]].map(|others| others.iter().any(stands_there));
+        let z_m = 0.02 * (f64::from(is_upper) - f64::from(is_lower));
+        let (position_m, spin) = (
+            [arm_m * front, -arm_m * right, z_m],
+            if *is_clockwise { "clockwise" } else { "counter-clockwise" },
+        );
+        text += &format!(
+            "[[rotors]]\nname = \"{number}\"\n\
+             position = {{ value = {position_m:?}, unit = \"m\", source = \"a test\", uncertainty = \"exact\" }}\n\
+             spin = {{ value = {spin:?}, source = \"a test\" }}\n"
+        );
+    }
+    place.write(&format!("{name}.toml"), text)
 }
 
 #[test]
-fn betaflight_flies_coaxial_pairs_as_it_flies_the_hummingbird() {
+fn betaflight_flies_the_hover_and_its_doublet_with_each_mixer() {
     let Some(program) = variable_or_skip("HUMMINGBUS_BETAFLIGHT", "the program of Betaflight's SITL") else {
         return;
     };
     let place = Place::new();
-    let vehicle = coaxial(&place);
-    let settings = [
-        format!("process.controller.firmware={program}"),
-        format!("process.controller.vehicle={vehicle}"),
-        format!("process.plant.vehicle={vehicle}"),
-        format!("process.plant.inputs.command.initial.command={:?}", [76.5; 8]),
-    ];
-    let recording = place.path("coaxial.mcap");
-    call(&place, "run", &manifest(), &settings, &["--record", &recording]).with_code(0);
+    for (name, motors) in MIXERS {
+        let (base, arm_m, manifest) = like_mixer(motors);
+        let vehicle = vehicle_of_mixer(&place, name, motors, base, arm_m);
+        let mut settings = vec![format!("process.controller.firmware={program}")];
+        settings.extend(["plant", "controller"].map(|node| format!("process.{node}.vehicle={vehicle}")));
+        if base == "hummingbird" {
+            let hover = vec![76.5; motors.len()];
+            settings.push(format!("process.plant.inputs.command.initial.command={hover:?}"));
+        }
+        let manifest = repository(&format!("manifests/autopilots/{manifest}.toml"));
+        let recording = place.path(&format!("{name}.mcap"));
+        call(&place, "run", &manifest, &settings, &["--record", &recording]).with_code(0);
+    }
 }
 
 /// The hover and the doublet of both, by the conditions of both.
