@@ -4,6 +4,7 @@
 mod ardupilot;
 mod px4;
 
+use crate::documentation::code_blocks;
 use crate::recordings::{open, require_same};
 use crate::skipped::{cases, is_left, variable_or_skip};
 use crate::support::{Ended, Place, repository};
@@ -443,6 +444,19 @@ fn betaflight_flies_the_hover_and_its_doublet() {
         }
         require_same(&fs::read(&first).unwrap(), &second);
     }
+}
+
+#[test]
+fn the_process_of_the_page_about_firmware_passes_its_check() {
+    let place = Place::new();
+    let [block] = &code_blocks("docs/firmware.md", "toml")[..] else { panic!("one block of TOML") };
+    let vehicles = format!("\"{}/", repository("vehicles"));
+    let block = block.replace("\"../vehicles/", &vehicles);
+    // Beside the page's manifest.
+    place.write("betaflight.cli", fs::read(repository("manifests/autopilots/betaflight.cli")).unwrap());
+    let settings = stand_in(&place, "");
+    let page = place.write("page.toml", format!("include = [{:?}]\n{block}\n", manifest()));
+    call(&place, "check", &page, &settings[..1], &[]).with_code(0);
 }
 
 /// The stand-in flies quadrotors alone: without the real firmware these two are checked, and not flown.

@@ -2,7 +2,7 @@
 
 use crate::refusals::good;
 use crate::support::{HUMMINGBUS, Place, repository};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -161,33 +161,8 @@ fn every_manifest_is_named_in_the_scenarios() {
     }
 }
 
-/// The table of languages states how long each example is; the pages of C++ and Python do, too.
-#[test]
-fn the_examples_in_other_languages_have_the_stated_numbers_of_lines() {
-    let readme = fs::read_to_string(repository("README.md")).unwrap();
-    let mut lengths = BTreeMap::new();
-    for row in readme.lines().filter_map(|line| Some(line.split_once(" lines |")?.0)) {
-        let (link, stated) = row.rsplit_once(", ").unwrap();
-        let path = link.rsplit_once('(').unwrap().1.trim_end_matches(')').to_owned();
-        let found = fs::read_to_string(repository(&path)).unwrap().lines().count();
-        assert_eq!(stated.parse(), Ok(found), "README.md states {stated} lines of {path}");
-        lengths.insert(path, found);
-    }
-    assert_eq!(lengths.len(), 4, "{lengths:?}");
-    for (page, example, most) in [
-        ("docs/cpp.md", "examples/cpp/controller.cpp", 60),
-        ("docs/python.md", "examples/python/controller.py", 70),
-    ] {
-        let text = fs::read_to_string(repository(page)).unwrap();
-        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        let length = lengths[example];
-        assert!(length <= most, "{example} has {length} lines, at most {most} are an example");
-        assert!(words.contains(&format!("in {length} lines")), "{page} states another length of {example}");
-    }
-}
-
 /// The content of each code block of a page that begins with this line.
-fn code_blocks(page: &str, fence: &str) -> Vec<String> {
+pub fn code_blocks(page: &str, fence: &str) -> Vec<String> {
     let text = fs::read_to_string(repository(page)).unwrap();
     let opening = format!("\n```{fence}\n");
     let blocks = text.split(&opening).skip(1);
@@ -285,6 +260,21 @@ fn the_examples_of_the_readme_have_as_many_lines_as_it_says() {
         count += 1;
     }
     assert_eq!(count, 4);
+}
+
+/// The pages of C++ and Python state the lengths, too. An example is short.
+#[test]
+fn the_controllers_of_two_pages_have_as_many_lines_as_they_say() {
+    for (page, path, most) in [
+        ("docs/cpp.md", "examples/cpp/controller.cpp", 60),
+        ("docs/python.md", "examples/python/controller.py", 70),
+    ] {
+        let lines = fs::read_to_string(repository(path)).unwrap().lines().count();
+        let text = fs::read_to_string(repository(page)).unwrap();
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains(&format!(" in {lines} lines")), "{page}: {path} has {lines} lines");
+        assert!(lines <= most, "{path} has {lines} lines, expected at most {most}");
+    }
 }
 
 /// The keys that the refusal of `unknown_key` in the good manifest, with `from` replaced by `to`, names as known.

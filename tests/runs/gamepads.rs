@@ -1,5 +1,6 @@
 //! A gamepad that moves channels of `rc`: a pipe with the events of a joystick device.
 
+use crate::documentation::code_blocks;
 use crate::support::Place;
 use std::fs::File;
 use std::io::Write as _;
@@ -72,4 +73,23 @@ fn a_gamepad_moves_sticks_and_switches_until_it_goes() {
     refused.says(&["twice.toml:", "`controls` moves channel 5, which `script` moves"]);
     let absent = place.write("absent.toml", manifest("/nowhere/js0"));
     place.call(&["check", &absent]).with_code(2).says(&["/nowhere/js0: cannot open the gamepad"]);
+}
+
+/// The page has a script and a gamepad; the pipe takes the place of the device.
+#[test]
+fn the_sticks_of_the_page_pass_their_check() {
+    let place = Place::new();
+    let pipe = place.path("js0");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let _gamepad = File::options().read(true).write(true).open(&pipe).unwrap();
+    let blocks = code_blocks("docs/set-points.md", "toml");
+    let block =
+        |key: &str| blocks.iter().find(|block| block.contains(key)).unwrap_or_else(|| panic!("{key}"));
+    let run = "[run]\nduration_s = 3.0\n[process.recorder]\nkind = \"recorder\"\n";
+    let script = format!("{run}{}\noutputs.rc = {{}}\n", block("parameters.script = ["));
+    let gamepad = block("gamepad = \"/dev/input/js0\"").replace("/dev/input/js0", &pipe);
+    let gamepad = format!("{run}[process.sticks]\nkind = \"rc\"\noutputs.rc = {{}}\n{gamepad}\n");
+    for (name, text) in [("script.toml", script), ("gamepad.toml", gamepad)] {
+        place.call(&["check", &place.write(name, text)]).with_code(0);
+    }
 }
