@@ -106,6 +106,10 @@ class HoverEnv(gymnasium.Env):
         return np.concatenate(parts)
 
 
+# For `gymnasium.make` and `make_vec`, once this module is imported.
+gymnasium.register("hummingbus/Hover-v0", entry_point="hummingbus.envs:HoverEnv")
+
+
 def _quoted(text: str) -> str:
     """A text as TOML writes it."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

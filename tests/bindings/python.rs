@@ -697,6 +697,12 @@ fn an_environment_is_what_gymnasium_expects_and_a_seed_gives_the_same_episode() 
          \x20   assert abs(observation[:6]).max() < 0.01, (vehicle, observation)\n\
          \x20   for _ in range(20): observation, *_ = env.step(np.ones(rotors))\n\
          \x20   assert observation[5] > 0.1, (vehicle, observation)\n\
+         # By its name, as programs for training make environments.\n\
+         env = gymnasium.make('hummingbus.envs:hummingbus/Hover-v0', vehicle='vehicles/dji-f550.toml')\n\
+         assert env.action_space.shape == (6,), env.action_space\n\
+         many = gymnasium.make_vec('hummingbus/Hover-v0', num_envs=3)\n\
+         assert (many.reset(seed=1)[0][:2] == same[0][0]).all() and many.action_space.shape == (3, 4)\n\
+         many.close()\n\
          try: HoverEnv('vehicles/nothing.toml')\n\
          except hb.Error as error: assert 'vehicles/nothing.toml' in str(error), error\n\
          else: raise AssertionError",
