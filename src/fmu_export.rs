@@ -117,9 +117,10 @@ fn explained(fault: Diagnostic, cut: &[String]) -> Diagnostic {
 /// The manifest at `path`, or that of the vehicle file there.
 fn load(path: &Path, overrides: &[String]) -> anyhow::Result<Manifest> {
     let text = InputFiles::default().text(path).with_context(|| format!("cannot read {}", path.display()))?;
+    // A vehicle file has a body, or the one of its base; no manifest has either.
     let is_vehicle = text
         .parse::<toml::Table>()
-        .is_ok_and(|table| table.contains_key("body") && !table.contains_key("process"));
+        .is_ok_and(|table| table.contains_key("body") || table.contains_key("base"));
     if !is_vehicle {
         return Ok(Manifest::load(path, overrides, registry())?);
     }

@@ -114,11 +114,11 @@ fn a_vehicle_of_a_manifest_of_ten_is_exported_and_flies_as_it_does_alone() {
     assert_eq!(*unwired, serde_json::json!(["v0/plant.traffic", "v0/range.traffic"]), "{ended}");
 }
 
-#[test]
-fn a_vehicle_as_an_fmu_joins_a_run_as_its_plant() {
-    let place = Place::new();
-    let fmu = place.path("hummingbird.fmu");
-    place.call(&["export-fmu", &repository("vehicles/hummingbird.toml"), "--out", &fmu]).with_code(0);
+/// Heights and climbs of the vehicle `name` in a run of 0.5 s: its FMU is the plant, and keeps the commands that it begins with,
+/// 1 count above those of hover.
+fn climbed(place: &Place, name: &str) -> [Vec<f64>; 2] {
+    let fmu = place.path(&format!("{name}.fmu"));
+    place.call(&["export-fmu", &repository(&format!("vehicles/{name}.toml")), "--out", &fmu]).with_code(0);
     let commands: String =
         (0..4).map(|rotor| format!("\"controller.command.command[{rotor}]\" = 77.5\n")).collect();
     let text = format!(
@@ -127,12 +127,45 @@ fn a_vehicle_as_an_fmu_joins_a_run_as_its_plant() {
          \"plant.state.position.z\" = \"state.position.z\"\n\"plant.state.velocity.z\" = \"state.velocity.z\"\n\
          [process.plant.parameters.start]\nseed = 7\n{commands}[process.recorder]\nkind = \"recorder\"\n"
     );
-    fly(&place, &place.write("plant.toml", text), "plant.mcap").with_code(0);
-    // Its inputs keep the commands that they begin with: 1 count above hover, with which it climbs.
-    let height = column(&place, "plant.mcap", "/plant/state", "position.z");
-    let climb = column(&place, "plant.mcap", "/plant/state", "velocity.z");
+    let recording = format!("{name}.mcap");
+    fly(place, &place.write("plant.toml", text), &recording).with_code(0);
+    ["position.z", "velocity.z"].map(|field| column(place, &recording, "/plant/state", field))
+}
+
+/// The second one has the first as its base, and drag.
+#[test]
+fn a_vehicle_as_an_fmu_joins_a_run_as_its_plant() {
+    let place = Place::new();
+    let [height, climb] = climbed(&place, "hummingbird");
     assert!(height.len() == 500 && (0.01..0.2).contains(&(height[499] - 1.0)), "{:?}", height.last());
     assert!(climb.windows(2).all(|pair| pair[0] <= pair[1] + 1e-12), "it climbs ever faster");
+    let [_, dragged] = climbed(&place, "hummingbird-drag");
+    assert!(dragged.len() == 500 && dragged[499] > 0.9 * climb[499] && dragged[499] < climb[499]);
+}
+
+/// The processes of a group as a whole.
+#[test]
+fn a_group_of_a_manifest_is_exported() {
+    let place = Place::new();
+    let group = "[group.craft]\nprocesses = [\"plant\", \"imu\", \"mocap\"]\n";
+    let text = format!("include = [{:?}]\n{group}", repository("manifests/hover.toml"));
+    let (manifest, fmu) = (place.write("group.toml", text), place.path("craft.fmu"));
+    let arguments = [
+        "export-fmu",
+        &manifest,
+        "--only",
+        "craft,controller",
+        "--out",
+        &fmu,
+        "--output",
+        "/imu/imu",
+        "--json",
+    ];
+    let ended = place.call(&arguments).with_code(0);
+    assert_eq!(ended.json()["unwired"], serde_json::json!([]), "{ended}");
+    // The filter is not in the group.
+    let arguments = [&arguments[..7], &["/ekf/estimate"]].concat();
+    place.call(&arguments).with_code(2).says(&["there is no topic /ekf/estimate"]);
 }
 
 #[test]
