@@ -64,7 +64,7 @@ impl Brief {
 fn answer(report: &Report) -> String {
     let count = report.verdict.len();
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
-    let (small, beyond) = (report.small_names(), report.withdrawn_names(true));
+    let (small, beyond) = (report.small_names(), report.bound_names());
     if report.stopped {
         "The search was stopped before its end: there is no answer yet.".to_owned()
     } else if report.is_undecided() {
@@ -80,7 +80,7 @@ fn answer(report: &Report) -> String {
              property of the vehicle.",
             report.prediction_only.join(" and ")
         )
-    } else if count == 0 && !small.is_empty() {
+    } else if count == 0 && !small.is_empty() && report.at_limit.is_empty() {
         format!(
             "The declared vehicle file predicts these flights as well as any. They show {}, too small to change a prediction.",
             small.join(" and ")
@@ -422,6 +422,15 @@ mod tests {
         let mass = Withdrawn { effect: "mass-error", at_bound: true, ..found.clone() };
         let answer = Brief::of(&Report { withdrawn: vec![replaced, mass], ..Report::of_nothing() }).answer;
         assert!(answer.contains("They put the estimate of mass-error at its bound"), "{answer}");
+        let touched = BTreeMap::from([("gyroscopic-torque", "it touches its limit".to_owned())]);
+        let limited = Report { at_limit: touched, withdrawn: vec![found], ..Report::of_nothing() };
+        let (answer, text) = (Brief::of(&limited).answer, limited.to_string());
+        assert!(answer.contains("They put the estimate of gyroscopic-torque at its bound"), "{answer}");
+        assert!(
+            text.contains("verdict: nothing. The equations put the estimate of gyroscopic-torque at"),
+            "{text}"
+        );
+        assert!(text.contains("\nfitted and not named: gyroscopic-torque: it touches its limit\n"), "{text}");
         let short = Brief::of(&Report { validation_blocks: 3, ..Report::of_nothing() });
         assert_eq!(short.answer, "These flights are too short to tell.");
         assert!(short.next[0].starts_with("Fly longer: "), "{:?}", short.next);

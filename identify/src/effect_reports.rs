@@ -1,5 +1,6 @@
 //! Reports of effects: each candidate as it was judged last, and the accepted ones beside each other.
 
+use crate::at_limit::limit_touched;
 use crate::candidate::{Candidate, FAST_COMMANDS, Unidentifiable, free_parameters};
 use crate::confounded::Rival;
 use crate::fit::Problem;
@@ -181,7 +182,8 @@ pub fn estimates(problem: &Problem, fitted: &FitResult, free: &[usize]) -> BTree
         // Commands that were logged slowly make it come out too small, which no block of time shows.
         let bias = logging::bias(problem, entry);
         let (low, high) = ((value - half).max(entry.spec().min), (value + half + bias).min(entry.max));
-        let at_bound = reached_bound(problem, fitted, *at).is_some();
+        let at_bound =
+            reached_bound(problem, fitted, *at).or_else(|| limit_touched(problem, fitted, *at)).is_some();
         let determined = low > entry.spec().min || high < entry.max;
         let unit = entry.spec().unit();
         (entry.spec().name, Estimate { value, unit, low, high, at_bound, determined, by_equations: None })

@@ -35,6 +35,7 @@
 //! | `refine` | parameters moved to where predictions are best |
 //! | `regressor` | what residuals are looked at against |
 //! | `envelope` | the ranges of the test flights, in which the verdict was judged |
+//! | `at_limit`, `unnamed` | effects whose parameters end at the limit of their meaning; names of all effects that are found and not named |
 //! | [`effect_reports`], [`worth`] | each effect as it was judged, and what predictions gain by it |
 //! | [`report`], `flight_report`, [`brief`], [`vehicle_file`] | what is written down |
 //! | `digits` | numbers in texts for people |
@@ -57,6 +58,7 @@ extern crate self as identify;
 
 pub mod accelerations;
 mod align;
+mod at_limit;
 pub mod brief;
 mod candidate;
 mod clock;
@@ -123,6 +125,7 @@ pub mod steps_ahead;
 mod test_flights;
 mod track;
 mod trim;
+mod unnamed;
 mod unusable;
 pub mod vehicle_file;
 mod weigh;

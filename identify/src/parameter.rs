@@ -187,12 +187,24 @@ impl Parameter {
     /// the baseline.
     pub fn reached(&self, value: f64) -> Option<f64> {
         let spec = self.spec();
-        let reach = AT_BOUND * self.scale;
+        let reach = self.reach();
         let is_reached = |bound: &f64| {
             let is_declared = (self.baseline - bound).abs() <= reach;
             (value - bound).abs() <= reach && !is_declared && !may_be_true(spec, *bound)
         };
         [spec.min, self.max].into_iter().find(is_reached)
+    }
+
+    /// Distance from a bound within which an estimate has reached it.
+    pub fn reach(&self) -> f64 {
+        AT_BOUND * self.scale
+    }
+
+    /// The limit of its meaning on that side of the baseline on which `value` is; `None` where that bound is a state of a vehicle: no effect, or a
+    /// whole share.
+    pub fn limit_ahead(&self, value: f64) -> Option<f64> {
+        let limit = if value < self.baseline { self.spec().min } else { self.max };
+        (!is_state(self.spec(), limit)).then_some(limit)
     }
 
     /// True if `value` is a bound other than the baseline.
@@ -205,13 +217,18 @@ impl Parameter {
 /// A value has reached a bound within this part of a plausible change: a fit may end a small step before the bound.
 const AT_BOUND: f64 = 0.01;
 
-/// True for bounds that the truth may be: no effect, a quantity that the vehicle does not have (an error of -1), and a whole share. The other
+/// True for bounds that the truth may be: states of a vehicle, and a quantity that the vehicle does not have (an error of -1). The other
 /// bounds are limits of what is plausible.
 #[allow(clippy::float_cmp, reason = "bounds are constants")]
 fn may_be_true(spec: &ParameterSpec, bound: f64) -> bool {
-    let is_whole_share = spec.min == 0.0 && bound == 1.0;
-    let is_ratio = spec.unit() == "1";
-    spec.neutral == Some(bound) || (is_ratio && (bound == -1.0 || is_whole_share))
+    is_state(spec, bound) || (spec.unit() == "1" && bound == -1.0)
+}
+
+/// True for bounds that are states of a vehicle: no effect, and a whole share.
+#[allow(clippy::float_cmp, reason = "bounds are constants")]
+fn is_state(spec: &ParameterSpec, bound: f64) -> bool {
+    let is_whole_share = spec.unit() == "1" && spec.min == 0.0 && bound == 1.0;
+    spec.neutral == Some(bound) || is_whole_share
 }
 
 /// The grid cannot see less.

@@ -38,6 +38,8 @@ pub struct Report {
     pub prediction_only: Vec<&'static str>,
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason. They are fitted, and not named.
     pub without_worth: BTreeMap<&'static str, String>,
+    /// Accepted effects whose parameters touch the limit of their meaning, each with the reason. They are fitted, and not named.
+    pub at_limit: BTreeMap<&'static str, String>,
     /// True if the search was stopped before its end: effects may be missing, and predictions have judged none of those that are named.
     pub stopped: bool,
     /// Predictions of the test flights that lose to persistence or to the declared vehicle: then the vehicle file does not
@@ -217,7 +219,7 @@ fn clock_in_words(offset: Offset) -> String {
 impl Report {
     /// The effects of the verdict, and those that are fitted and not named.
     fn accepted(&self) -> impl Iterator<Item = &&'static str> {
-        self.verdict.iter().chain(&self.prediction_only).chain(self.without_worth.keys())
+        self.verdict.iter().chain(&self.prediction_only).chain(self.unnamed().map(|(effect, _)| effect))
     }
 
     /// True if no effect was accepted and the validation data are too short for one.
@@ -318,32 +320,6 @@ impl Report {
         Ok(())
     }
 
-    /// The withdrawn effects that reached a bound, or the others. Effects that another one replaced are in neither list: they are not small.
-    pub(crate) fn withdrawn_names(&self, at_bound: bool) -> Vec<&'static str> {
-        let is_listed =
-            |withdrawn: &&Withdrawn| withdrawn.at_bound == at_bound && withdrawn.replaced_by.is_none();
-        let withdrawn = self.withdrawn.iter().filter(is_listed);
-        withdrawn.map(|withdrawn| withdrawn.effect).collect()
-    }
-
-    /// The effects that change no prediction noticeably: withdrawn, or fitted and not named.
-    pub(crate) fn small_names(&self) -> Vec<&'static str> {
-        self.withdrawn_names(false).into_iter().chain(self.without_worth.keys().copied()).collect()
-    }
-
-    /// The reason why no effect is named.
-    fn no_effect(&self) -> String {
-        let [effects, beyond] =
-            [self.small_names(), self.withdrawn_names(true)].map(|names| names.join(", "));
-        if !effects.is_empty() {
-            format!("The equations fit better with {effects}, but no prediction error falls noticeably.")
-        } else if !beyond.is_empty() {
-            format!("The equations put the estimate of {beyond} at its bound: the cause is not known.")
-        } else {
-            "No candidate makes the equations fit better beyond chance.".to_owned()
-        }
-    }
-
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.stopped {
             let found: Vec<&str> = self.verdict.iter().chain(&self.prediction_only).copied().collect();
@@ -375,7 +351,7 @@ impl Report {
             let names = self.prediction_only.join(", ");
             writeln!(f, "kept for predictions only, not a property of the vehicle: {names}")?;
         }
-        for (effect, reason) in &self.without_worth {
+        for (effect, reason) in self.unnamed() {
             writeln!(f, "fitted and not named: {effect}: {reason}")?;
         }
         if let Some(bearing) = self.bearing {
@@ -624,6 +600,7 @@ impl Report {
             verdict: Vec::new(),
             prediction_only: Vec::new(),
             without_worth: BTreeMap::new(),
+            at_limit: BTreeMap::new(),
             stopped: false,
             losses: Vec::new(),
             bearing: None,

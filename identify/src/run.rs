@@ -1,6 +1,7 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
 use crate::align::{Offsets, align};
+use crate::at_limit::at_limits;
 use crate::candidate::{Candidate, candidates};
 use crate::clock::Lateness;
 use crate::confounded::rivals;
@@ -161,13 +162,17 @@ pub fn identify_until(
         |name: &&'static str| effects.get(name).is_some_and(EffectReport::is_contradictory);
     let accepted = effect_reports::accepted(&problem, &selection);
     let without_worth = selection.without_worth.clone();
-    let named = accepted.into_iter().filter(|name| !without_worth.contains_key(name));
+    let mut at_limit = at_limits(&problem, &selection.accepted, selection.flown());
+    at_limit.retain(|name, _| accepted.contains(name) && !without_worth.contains_key(name));
+    let is_named = |name: &&'static str| !without_worth.contains_key(name) && !at_limit.contains_key(name);
+    let named = accepted.into_iter().filter(is_named);
     let (prediction_only, verdict) = named.partition(is_contradictory);
     let report = Report {
         vehicle: set.vehicle.display().to_string(),
         verdict,
         prediction_only,
         without_worth,
+        at_limit,
         stopped: selection.is_stopped,
         losses,
         bearing: bearing(&problem),

@@ -202,6 +202,7 @@ mod tests {
             verdict: Vec::new(),
             prediction_only: Vec::new(),
             without_worth: BTreeMap::new(),
+            at_limit: BTreeMap::new(),
             stopped: false,
             losses: Vec::new(),
             bearing: None,

@@ -23,7 +23,8 @@ const addItem = (id, textContent) => add(element(id), "li", { textContent });
 
 // Those of the verdict, and those that are fitted and not named.
 const unworthyNames = Object.keys(report.without_worth);
-const acceptedNames = [...report.verdict, ...report.prediction_only, ...unworthyNames];
+const boundNames = Object.keys(report.at_limit);
+const acceptedNames = [...report.verdict, ...report.prediction_only, ...unworthyNames, ...boundNames];
 const accepted = acceptedNames.map((name) => [name, report.effects[name]]).filter(([, effect]) => effect);
 
 const doubt = ({ determined, at_bound }) => (!determined ? ", not determined by these flights" : at_bound ? ", at its bound" : "");
@@ -50,6 +51,7 @@ function verdictText() {
   }
   const kept = report.prediction_only.length ? ` Kept for predictions only, not a property of the vehicle: ${report.prediction_only.join(", ")}.` : "";
   if (report.verdict.length) return `The flights ask for ${report.verdict.join(", ")}.${kept}`;
+  if (boundNames.length && !kept) return `The equations put the estimate of ${boundNames.join(", ")} at its bound: the cause is not known.`;
   if (unworthyNames.length && !kept) return `The equations fit better with ${unworthyNames.join(", ")}, but no prediction error falls noticeably.`;
   if (kept) return `The flights ask for nothing that is a property of the vehicle.${kept}`;
   if (isUndecided) {
@@ -72,7 +74,7 @@ function drawSummary() {
   title(`${report.vehicle.split(/[\\/]/).pop().replace(/\.toml$/, "")}: what flights show beyond the declared model`);
   element("verdict").textContent = verdictText();
   for (const loss of report.losses) addItem("findings", `Loses: ${lossText(loss)}.`);
-  for (const [effect, reason] of Object.entries(report.without_worth)) addItem("findings", `Fitted and not named, ${effect}: ${reason}.`);
+  for (const [effect, reason] of [report.without_worth, report.at_limit].flatMap(Object.entries)) addItem("findings", `Fitted and not named, ${effect}: ${reason}.`);
   for (const { effect, reason } of report.withdrawn) addItem("findings", `Withdrawn, ${effect}: ${reason}.`);
   for (const [name, effect] of accepted) {
     const estimates = Object.entries(effect.parameters).map(estimateText);
