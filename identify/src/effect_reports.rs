@@ -217,6 +217,7 @@ mod tests {
             withdrawn: Vec::new(),
             worths: BTreeMap::new(),
             without_worth: BTreeMap::new(),
+            asked: Vec::new(),
             is_stopped: false,
         };
         assert_eq!(far_by_equations(&selection(Some(1.9)), 0), Some(1.0));

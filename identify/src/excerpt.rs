@@ -9,7 +9,7 @@ use crate::fit_result::FitResult;
 use crate::judgement::held_at_limits;
 use crate::prepared::Prepared;
 use crate::refine::refined;
-use crate::revision::{beyond_bounds, without_effects};
+use crate::revision::{Withdrawn, unsound, unsound_refined, without_effects};
 use crate::select::Selection;
 use flights::Role;
 use std::ops::Range;
@@ -83,34 +83,42 @@ fn pieces(flight: &Prepared, share: f64) -> Vec<Range<usize>> {
     pieces
 }
 
-/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again. An
-/// effect with a parameter that reaches its bound only here is withdrawn.
+/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again. Every
+/// effect is tested once more by them: one with a parameter at its bound is withdrawn, and one that is not beyond chance beside the others.
 pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Selection {
     problem.noises = excerpt.noises.clone();
     let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
     let mut found = Selection { before, ..found };
     loop {
-        (found.after, found.refined) = fitted_on_all(problem, &found);
-        let mut fits = std::iter::once(&found.after).chain(&found.refined);
-        let stopped = fits.find_map(|fit| beyond_bounds(problem, &found.accepted, fit));
-        let Some(stopped) = stopped else { return found };
+        let unsound = match fitted_on_all(problem, &found) {
+            Ok((after, refined)) => return Selection { after, refined, ..found },
+            Err(unsound) => unsound,
+        };
         (found.accepted, found.after) =
-            without_effects(problem, &found.accepted, &found.after, &[stopped.effect]);
-        found.worths.remove(stopped.effect);
-        found.without_worth.remove(stopped.effect);
-        found.withdrawn.push(stopped);
+            without_effects(problem, &found.accepted, &found.after, &[unsound.effect]);
+        found.worths.remove(unsound.effect);
+        found.without_worth.remove(unsound.effect);
+        found.withdrawn.push(unsound);
     }
 }
 
-/// The accepted effects of `found`, fitted on all of `problem`, and refined where they were.
-fn fitted_on_all(problem: &Problem, found: &Selection) -> (FitResult, Option<FitResult>) {
-    let fitted = problem.fitted(&found.after.values, &free_parameters(&found.accepted));
+/// The accepted effects of `found`, fitted on all of `problem`, and refined where they were; an error is the first effect that the fits do not
+/// support.
+fn fitted_on_all(problem: &Problem, found: &Selection) -> Result<(FitResult, Option<FitResult>), Withdrawn> {
+    let accepted = &found.accepted;
+    let fitted = problem.fitted(&found.after.values, &free_parameters(accepted));
     let after = held_at_limits(problem, fitted);
+    if let Some(unsound) = unsound(problem, accepted, &after, &found.asked) {
+        return Err(unsound);
+    }
     let shorter = shortened(problem, REFINED_S);
     let predicted = shorter.as_ref().unwrap_or(problem);
     let moved = found.refined.as_ref().and_then(|near| refined(predicted, &after, Some(&near.values)));
     let moved = moved.map(|moved| moved.result);
-    (after, moved)
+    match moved.as_ref().and_then(|moved| unsound_refined(problem, accepted, moved)) {
+        Some(unsound) => Err(unsound),
+        None => Ok((after, moved)),
+    }
 }
 
 /// The time of a flight that is compared in an excerpt, as a note for the report.
@@ -140,9 +148,11 @@ mod tests {
     use crate::model::Model;
     use crate::parameter::Parameters;
     use crate::prepared::Propulsion;
-    use crate::test_flights::{flown, hummingbird};
+    use crate::simulated::effect;
+    use crate::test_flights::{candidate, flown, hummingbird, simulated, with_light_rotors};
     use crate::whitening::Noises;
     use flights::{Channel, Flight};
+    use std::collections::BTreeMap;
 
     fn problem(flights: &[Flight]) -> Problem<'_> {
         let vehicle = hummingbird();
@@ -203,6 +213,44 @@ mod tests {
                 assert!(apart < most, "{at_s} s: {apart}, expected at most {most}");
             }
         }
+    }
+
+    /// Motors that are faster than declared ask for a negative delay, so that a delay is not beyond chance. The mass is.
+    #[test]
+    fn every_effect_is_tested_once_more_on_all_flights() {
+        let vehicle = with_light_rotors();
+        let truth = [effect("mass-error", &[("error", 0.2)]), effect("motor-lag", &[("slowness", -0.3)])];
+        let set = simulated(&vehicle, &truth);
+        let of_set = || crate::run::problem(&vehicle, &[], &set).expect("usable flights").0;
+        let (mut whole, mut part) = (of_set(), of_set());
+        let accepted = ["mass-error", "command-delay"].map(|name| candidate(&part, name)).to_vec();
+        let before = part.fitted(&part.model.parameters.baseline(), &[]);
+        part.weigh(&before, &accepted);
+        let after = part.fitted(&before.values, &free_parameters(&accepted));
+        let mass = accepted[0].clone();
+        let found = Selection {
+            accepted,
+            before,
+            after,
+            refined: None,
+            rounds: Vec::new(),
+            withdrawn: Vec::new(),
+            worths: BTreeMap::from([("command-delay", Vec::new())]),
+            without_worth: BTreeMap::new(),
+            asked: Vec::new(),
+            is_stopped: false,
+        };
+        let tested = on_all(&mut whole, &part, found.clone());
+        assert_eq!(tested.accepted, std::slice::from_ref(&mass), "{:?}", tested.withdrawn);
+        let [withdrawn] = &tested.withdrawn[..] else { panic!("{:?}", tested.withdrawn) };
+        assert_eq!((withdrawn.effect, withdrawn.at_bound), ("command-delay", false));
+        let reason = "its parameters are no longer beyond chance beside those of the others";
+        assert!(withdrawn.reason.starts_with(reason), "{}", withdrawn.reason);
+        assert!(tested.worths.is_empty() && tested.after.free == mass.free, "{tested:?}");
+        // Predictions may ask for an effect that the equations hardly show.
+        let asked = vec![found.accepted[1].clone()];
+        let kept = on_all(&mut whole, &part, Selection { asked, ..found });
+        assert_eq!(kept.accepted.len(), 2, "{:?}", kept.withdrawn);
     }
 
     #[test]

@@ -114,7 +114,7 @@ impl Revisions {
     ) -> Revision {
         progress("every effect once more, by its parameters");
         let search = Found { problem, accepted, base };
-        if let Some(found) = search.unsound(base, FALSE_RATE, &self.added) {
+        if let Some(found) = unsound(problem, accepted, base, &self.added) {
             return Revision::Without(vec![found]);
         }
         progress("refinement by prediction errors");
@@ -131,7 +131,7 @@ impl Revisions {
         };
         self.near = Some(moved.result.values.clone());
         progress("every effect once more, by predictions");
-        if let Some(found) = search.unsound(&moved.result, REFINED_RATE, &[]) {
+        if let Some(found) = unsound_refined(problem, accepted, &moved.result) {
             return Revision::Without(vec![found]);
         }
         let predictions = search.predictions_refined(&moved);
@@ -212,23 +212,6 @@ struct Found<'s, 'f> {
 }
 
 impl Found<'_, '_> {
-    /// An accepted effect with a parameter that `fitted` left at a bound. Else the effect that is least
-    /// beyond chance beside the others, if it misses `level`. Those `asked` for by predictions alone need not
-    /// be.
-    fn unsound(&self, fitted: &FitResult, level: f64, asked: &[Candidate]) -> Option<Withdrawn> {
-        let chance =
-            |candidate: &Candidate| (candidate.kind.name, joint_p_value(self.problem, fitted, candidate));
-        let by_chance = || {
-            let all = self.accepted.iter().filter(|candidate| !asked.contains(candidate)).map(chance);
-            let unsure = all.filter(|(_, chance)| *chance >= level);
-            let (effect, chance) = unsure.max_by(|a, b| a.1.total_cmp(&b.1))?;
-            let reason =
-                format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
-            Some(Withdrawn::because(effect, reason))
-        };
-        beyond_bounds(self.problem, self.accepted, fitted).or_else(by_chance)
-    }
-
     /// The accepted candidates of an effect.
     fn of_effect(&self, name: &str) -> Vec<Candidate> {
         self.accepted.iter().filter(|candidate| candidate.kind.name == name).cloned().collect()
@@ -438,8 +421,42 @@ fn unrefined_foresight(problem: &Problem, fitted: &FitResult) -> Foresight {
     Foresight::of(problem, &problem.equations(&fitted.values, &fitted.free), fitted, &[])
 }
 
+/// An accepted effect with a parameter that a fit of the equations left at a bound, or that is not beyond chance beside the others. Those `asked` for
+/// by predictions need not be: the equations alone may hardly show them.
+pub fn unsound(
+    problem: &Problem,
+    accepted: &[Candidate],
+    fitted: &FitResult,
+    asked: &[Candidate],
+) -> Option<Withdrawn> {
+    let by_chance = || by_chance(problem, accepted, fitted, (FALSE_RATE, asked));
+    beyond_bounds(problem, accepted, fitted).or_else(by_chance)
+}
+
+/// The same by a refined fit.
+pub fn unsound_refined(problem: &Problem, accepted: &[Candidate], refined: &FitResult) -> Option<Withdrawn> {
+    let by_chance = || by_chance(problem, accepted, refined, (REFINED_RATE, &[]));
+    beyond_bounds(problem, accepted, refined).or_else(by_chance)
+}
+
+/// The effect that is least beyond chance beside the others, if it misses `level`, all of its parameters together. Those `asked` for do not count.
+fn by_chance(
+    problem: &Problem,
+    accepted: &[Candidate],
+    fitted: &FitResult,
+    (level, asked): (f64, &[Candidate]),
+) -> Option<Withdrawn> {
+    let chance = |candidate: &Candidate| (candidate.kind.name, joint_p_value(problem, fitted, candidate));
+    let all = accepted.iter().filter(|candidate| !asked.contains(candidate)).map(chance);
+    let unsure = all.filter(|(_, chance)| *chance >= level);
+    let (effect, chance) = unsure.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let reason =
+        format!("its parameters are no longer beyond chance beside those of the others: {chance:.3}");
+    Some(Withdrawn::because(effect, reason))
+}
+
 /// The first of the `accepted` effects with a parameter that `fitted` left at a bound.
-pub fn beyond_bounds(problem: &Problem, accepted: &[Candidate], fitted: &FitResult) -> Option<Withdrawn> {
+fn beyond_bounds(problem: &Problem, accepted: &[Candidate], fitted: &FitResult) -> Option<Withdrawn> {
     let of_candidate = |candidate: &Candidate| {
         let reason = at_bound(problem, candidate, fitted)?;
         Some(Withdrawn { at_bound: true, ..Withdrawn::because(candidate.kind.name, reason) })

@@ -88,6 +88,8 @@ pub struct Selection {
     pub worths: BTreeMap<&'static str, Vec<Worth>>,
     /// Accepted errors of sensors that change no prediction noticeably, each with the reason.
     pub without_worth: BTreeMap<&'static str, String>,
+    /// Accepted candidates that predictions asked for: the equations alone may hardly show them.
+    pub asked: Vec<Candidate>,
     /// True if the search was stopped before its end.
     pub is_stopped: bool,
 }
@@ -207,7 +209,19 @@ impl StepwiseSearch {
         let Self { accepted, rounds, base: after } = self;
         let End { refined, worths, without_worth, is_stopped } = end;
         let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
-        Selection { accepted, before, after, refined, rounds, withdrawn, worths, without_worth, is_stopped }
+        let asked = revisions.added().to_vec();
+        Selection {
+            accepted,
+            before,
+            after,
+            refined,
+            rounds,
+            withdrawn,
+            worths,
+            without_worth,
+            asked,
+            is_stopped,
+        }
     }
 
     /// The `open` candidates that rounds took and that are no longer accepted.
