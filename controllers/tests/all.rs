@@ -12,6 +12,7 @@ mod bumpless_transfer;
 mod cascade;
 mod components;
 mod hover_and_doublet;
+mod played_battery;
 mod sticks;
 mod tracking;
 mod trajectory;
