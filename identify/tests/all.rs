@@ -23,3 +23,4 @@ mod statistics;
 mod steps_ahead;
 mod torques_of_the_air;
 mod winds;
+mod yaw_gain;

@@ -181,6 +181,23 @@ fn inertia_and_gyroscopic_torque_scale() {
 }
 
 #[test]
+fn a_torque_coefficient_scales_the_yaw_and_nothing_else() {
+    let accelerations = |error: f64| {
+        let mut flight = Flight::hovering(vec![effect("torque-scale", &[error])]);
+        // The two that are left turn one way.
+        flight.state.rotors[0].speed_rad_s = 0.0;
+        flight.state.rotors[2].speed_rad_s = 0.0;
+        flight.accelerations()
+    };
+    let (declared, more) = (accelerations(0.0), accelerations(0.5));
+    let yaw_rad_s2 = |found: &Accelerations| found.angular_acceleration_B_rad_s2.z;
+    assert!(yaw_rad_s2(&declared).abs() > 0.1, "{declared:?}");
+    assert!((yaw_rad_s2(&more) - 1.5 * yaw_rad_s2(&declared)).abs() < 1e-12, "{declared:?} {more:?}");
+    assert_eq!(more.specific_force_B_m_s2, declared.specific_force_B_m_s2);
+    assert_eq!(more.angular_acceleration_B_rad_s2.xy(), declared.angular_acceleration_B_rad_s2.xy());
+}
+
+#[test]
 fn a_slower_motor_is_the_same_motor_in_slower_time() {
     let flown = Flight::hovering(vec![effect("motor-lag", &[1.0, -0.5])]);
     let MotorModel::SecondOrder { natural_frequency_rad_s, damping_ratio } = flown.model.vehicle().motor

@@ -34,6 +34,7 @@ const NAMES: &[&str] = &[
     "mass-error",
     "com-offset",
     "inertia-error",
+    "torque-scale",
     "gyroscopic-torque",
     "rig-pendulum",
     "bearing-friction",

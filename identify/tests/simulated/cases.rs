@@ -17,7 +17,8 @@ pub const MATTERS: f64 = 0.01;
 /// Delay that a vehicle in free flight may have and still fly.
 pub const FREE_DELAY_S: f64 = 0.02;
 
-/// Names of the effects that are candidates without rotor speeds; the others are in `torques_of_the_air`.
+/// Names of the effects that are candidates without rotor speeds; the others are in `torques_of_the_air`, and the drag torque of the rotors
+/// is in `yaw_gain`.
 pub const EFFECTS: [&str; 20] = [
     "rotor-drag",
     "parasitic-drag",

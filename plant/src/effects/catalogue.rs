@@ -20,6 +20,7 @@ mod rate_damping;
 mod rig_pendulum;
 mod rotor_drag;
 mod thrust_scale;
+mod torque_scale;
 mod translational_lift;
 pub(super) mod turbulence;
 mod velocity_torque;
@@ -47,6 +48,7 @@ pub static CATALOGUE: &[&EffectKind] = &[
     &mass_error::EFFECT,
     &com_offset::EFFECT,
     &inertia_error::EFFECT,
+    &torque_scale::EFFECT,
     &gyroscopic_torque::EFFECT,
     &rig_pendulum::EFFECT,
     &bearing_friction::EFFECT,
