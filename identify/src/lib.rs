@@ -27,7 +27,7 @@
 //! | [`proposal`] | the next flight, as reports hold it |
 //! | `rig` | flights of vehicles that a rig holds |
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
-//! | `sensing` | the sensors' delays and biases, and a flight without them |
+//! | `sensing`, `rotor_speed_filter` | the sensors' delays, biases and filters, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `predict`, `forecast`, `horizons` | prediction over horizons, and tables of its errors |
 //! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
@@ -108,6 +108,7 @@ mod revision;
 mod rig;
 pub mod rotor;
 mod rotor_clock;
+mod rotor_speed_filter;
 mod rotor_track;
 mod rows;
 pub mod run;
@@ -146,6 +147,7 @@ pub use prepared::Equation;
 pub use questions::{OpenQuestions, Question};
 pub use ratios::{Ratio, Ratios};
 pub use regressor::Regressor;
+pub use rotor_speed_filter::SpeedFilter;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;
 
@@ -156,6 +158,6 @@ pub mod steps {
     pub use crate::parameter::{Parameter, Parameters};
     pub use crate::predict::Measured;
     pub use crate::sensor_effects::{
-        ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, SENSOR_BIAS, SENSOR_DELAY,
+        ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, ROTOR_SPEED_FILTER, SENSOR_BIAS, SENSOR_DELAY,
     };
 }

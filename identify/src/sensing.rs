@@ -2,11 +2,14 @@
 
 use crate::clock::Lateness;
 use crate::parameter::Parameters;
-use crate::sensor_effects::{ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY};
+use crate::rotor_speed_filter::SpeedFilter;
+use crate::sensor_effects::{
+    ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, ROTOR_SPEED_FILTER,
+};
 use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Lateness and biases of sensors.
+/// Lateness, biases and filters of sensors.
 ///
 /// ```
 /// use flights::{Channel, Flight, Role};
@@ -23,6 +26,8 @@ pub struct SensorErrors {
     pub pose_delay_s: f64,
     /// Lateness of gyroscope and accelerometer in s.
     pub inertial_delay_s: f64,
+    /// Filter and lateness of the rotor speeds.
+    pub rotor_speed: SpeedFilter,
     /// Bias of the accelerometer in B, in m/s^2.
     pub accelerometer_bias_m_s2: [f64; 3],
     /// Bias of the gyroscope in B, in rad/s.
@@ -36,12 +41,14 @@ impl SensorErrors {
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
         let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
         let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);
+        let [lag_s, late_s, ..] = parameters.values_of(&ROTOR_SPEED_FILTER, values);
         let [a_x, a_y, a_z, ..] = parameters.values_of(&ACCELEROMETER_BIAS, values);
         let [w_x, w_y, w_z, ..] = parameters.values_of(&GYROSCOPE_BIAS, values);
         let [turn_x, turn_y, ..] = parameters.values_of(&ATTITUDE_BIAS, values);
         Self {
             pose_delay_s,
             inertial_delay_s,
+            rotor_speed: SpeedFilter { lag_s, late_s },
             accelerometer_bias_m_s2: [a_x, a_y, a_z],
             gyroscope_bias_rad_s: [w_x, w_y, w_z],
             attitude_bias_rad: [turn_x, turn_y],
@@ -61,6 +68,7 @@ impl SensorErrors {
         earlier(&mut flight.velocity, self.pose_delay_s + late.velocity_s);
         earlier(&mut flight.attitude, self.pose_delay_s + late.attitude_s);
         earlier(&mut flight.rotor_speed, late.rotor_speed_s);
+        self.rotor_speed.taken_off(&mut flight.rotor_speed);
         earlier(&mut flight.angular_velocity, self.inertial_delay_s);
         earlier(&mut flight.specific_force, self.inertial_delay_s);
         less(&mut flight.angular_velocity, self.gyroscope_bias_rad_s);
@@ -90,11 +98,14 @@ impl SensorErrors {
         let negated = Self {
             pose_delay_s: -self.pose_delay_s,
             inertial_delay_s: -self.inertial_delay_s,
+            rotor_speed: SpeedFilter::default(),
             accelerometer_bias_m_s2: self.accelerometer_bias_m_s2.map(|bias| -bias),
             gyroscope_bias_rad_s: self.gyroscope_bias_rad_s.map(|bias| -bias),
             attitude_bias_rad: self.attitude_bias_rad.map(|turn| -turn),
         };
-        negated.taken_off(flight, &Lateness::default())
+        let mut flight = negated.taken_off(flight, &Lateness::default());
+        self.rotor_speed.put_on(&mut flight.rotor_speed);
+        flight
     }
 }
 
