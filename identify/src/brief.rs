@@ -64,7 +64,7 @@ impl Brief {
 fn answer(report: &Report) -> String {
     let count = report.verdict.len();
     let effects = if count == 1 { "one effect".to_owned() } else { format!("{count} effects") };
-    let (small, beyond) = (report.small_names(), report.bound_names());
+    let (small, beyond) = (report.unnamed().small_names(), report.unnamed().bound_names());
     if report.stopped {
         "The search was stopped before its end: there is no answer yet.".to_owned()
     } else if report.is_undecided() {

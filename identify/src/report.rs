@@ -11,6 +11,7 @@ use crate::proposal::Proposal;
 use crate::ratios::Ratios;
 use crate::revision::Withdrawn;
 use crate::trim::Trim;
+use crate::unnamed::Unnamed;
 use crate::whiteness::Whiteness;
 use crate::worth::{Worth, in_words};
 use diagnostics::unit::behind_number;
@@ -219,7 +220,14 @@ fn clock_in_words(offset: Offset) -> String {
 impl Report {
     /// The effects of the verdict, and those that are fitted and not named.
     fn accepted(&self) -> impl Iterator<Item = &&'static str> {
-        self.verdict.iter().chain(&self.prediction_only).chain(self.unnamed().map(|(effect, _)| effect))
+        let unnamed = self.unnamed().fitted().map(|(effect, _)| effect);
+        self.verdict.iter().chain(&self.prediction_only).chain(unnamed)
+    }
+
+    /// The effects that were found and are not named.
+    pub(crate) fn unnamed(&self) -> Unnamed<'_> {
+        let Self { withdrawn, without_worth, at_limit, .. } = self;
+        Unnamed { withdrawn, without_worth, at_limit }
     }
 
     /// True if no effect was accepted and the validation data are too short for one.
@@ -338,7 +346,7 @@ impl Report {
         } else if !self.losses.is_empty() {
             self.write_losses(f)?;
         } else if self.verdict.is_empty() && self.prediction_only.is_empty() {
-            writeln!(f, "\nverdict: nothing. {}", self.no_effect())?;
+            writeln!(f, "\nverdict: nothing. {}", self.unnamed().no_effect())?;
         } else if self.verdict.is_empty() {
             writeln!(f, "\nverdict: nothing that is a property of the vehicle")?;
         } else {
@@ -351,7 +359,7 @@ impl Report {
             let names = self.prediction_only.join(", ");
             writeln!(f, "kept for predictions only, not a property of the vehicle: {names}")?;
         }
-        for (effect, reason) in self.unnamed() {
+        for (effect, reason) in self.unnamed().fitted() {
             writeln!(f, "fitted and not named: {effect}: {reason}")?;
         }
         if let Some(bearing) = self.bearing {
@@ -440,7 +448,7 @@ impl Report {
         for channel in channels {
             writeln!(f, "to measure, for {}", advice(channel))?;
         }
-        let names: Vec<&str> = self.accepted().copied().collect();
+        let names: Vec<&str> = self.verdict.iter().chain(&self.prediction_only).copied().collect();
         if !names.is_empty() {
             let names = names.join(", ");
             writeln!(f, "The equations ask for these effects, which are not to be acted on: {names}")?;

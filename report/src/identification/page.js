@@ -46,7 +46,8 @@ function verdictText() {
   const isUndecided = !acceptedNames.length && report.validation_blocks < 12;
   if (report.stopped) return `The search was stopped before its end: effects may be missing or wrong. Found so far: ${acceptedNames.join(", ") || "nothing"}.`;
   if (report.losses.length && !isUndecided) {
-    const asked = acceptedNames.length ? ` The equations ask for ${acceptedNames.join(", ")}: not to be acted on.` : "";
+    const names = [...report.verdict, ...report.prediction_only];
+    const asked = names.length ? ` The equations ask for ${names.join(", ")}: not to be acted on.` : "";
     return `This vehicle file does not describe these flights: its predictions lose.${asked}`;
   }
   const kept = report.prediction_only.length ? ` Kept for predictions only, not a property of the vehicle: ${report.prediction_only.join(", ")}.` : "";
