@@ -8,11 +8,11 @@
 //! beyond it. Rotor speeds are the one channel whose lateness takes a model (`rotor_clock`); the clock of the inertial unit stays.
 
 use crate::clock::Lateness;
-use crate::excerpt;
 use crate::fit::Problem;
 use crate::noise_model::NoiseModel;
 use crate::normal::Block;
 use crate::offset::{Found, LATE_MAX_S, descended};
+use crate::parts;
 use crate::prepared::{Equation, Prepared, Translation};
 use crate::rotor_clock::of_rotor_speed;
 use crate::sensor_effects::POSE_DELAY;
@@ -149,7 +149,7 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
     let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
     let flights: Vec<&Prepared> = problem.flights().collect();
     let of_flight = |flight: &&Prepared| {
-        let part = excerpt::of_flight(flight);
+        let part = parts::of_flight(flight);
         Clocks::of(problem, part.as_ref().unwrap_or(flight))
     };
     let clocks: Vec<Clocks> = flights.par_iter().map(of_flight).collect();

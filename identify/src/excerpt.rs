@@ -7,24 +7,16 @@ use crate::candidate::free_parameters;
 use crate::fit::Problem;
 use crate::fit_result::FitResult;
 use crate::judgement::held_at_limits;
+use crate::parts::{MOST, within};
 use crate::prepared::Prepared;
 use crate::refine::refined;
 use crate::revision::{Withdrawn, unsound, unsound_refined, without_effects};
 use crate::select::Selection;
-use flights::Role;
-use std::ops::Range;
 
 /// Effects are looked for in about so much of the estimation data, in s; tuned, no source.
 const SEARCH_S: f64 = 160.0;
 /// Their parameters are refined by predictions of about so much of it, in s.
 const REFINED_S: f64 = 600.0;
-/// Length of the part of a flight by which its clocks are aligned, in s. Predictions of a flight that is not
-/// for test are made in about as much.
-const FLIGHT_S: f64 = 300.0;
-/// Length of a piece of a flight, in s: many times as long as manoeuvres and disturbances remember themselves.
-const PIECE_S: f64 = 10.0;
-/// Nothing is left out where this part of the data or more would stay.
-const MOST: f64 = 0.7;
 
 /// The problem with pieces of its flights, spread evenly over each; `None` where there is not much more than the search needs.
 pub fn excerpt<'f>(problem: &Problem<'f>) -> Option<Problem<'f>> {
@@ -48,39 +40,6 @@ fn shortened<'f>(problem: &Problem<'f>, time_s: f64) -> Option<Problem<'f>> {
         block_s: problem.block_s,
         shared_late_s: problem.shared_late_s,
     })
-}
-
-/// Pieces of a flight that is long by itself; `None` of one that is not.
-pub fn of_flight<'f>(flight: &Prepared<'f>) -> Option<Prepared<'f>> {
-    let share = FLIGHT_S / flight.compared_s();
-    (share < MOST).then(|| within(flight, share))
-}
-
-/// The flight with a `share` of its time.
-fn within<'f>(flight: &Prepared<'f>, share: f64) -> Prepared<'f> {
-    flight.within(&pieces(flight, share))
-}
-
-/// A `share` of a flight: pieces in the middle of equal parts of what is compared of it.
-fn pieces(flight: &Prepared, share: f64) -> Vec<Range<usize>> {
-    let knots = &flight.layout.knots;
-    let count = (share * flight.compared_s() / PIECE_S).round().max(1.0) as usize;
-    let (before, behind) = flight.margins();
-    let bounds = |part: usize| (part * knots.len() / count, (part + 1) * knots.len() / count);
-    let piece = |part: usize| {
-        let (first, end) = bounds(part);
-        let left_out = ((1.0 - share) * (end - first) as f64) as usize;
-        let (first, end) = (first + left_out / 2, end - left_out.div_ceil(2));
-        let last = end.max(first + 1).min(knots.len()) - 1;
-        knots[first].saturating_sub(before)..(knots[last] + behind + 1).min(flight.layout.clock.count)
-    };
-    let mut pieces: Vec<Range<usize>> = (0..count).map(piece).collect();
-    pieces.dedup_by(|next, last| {
-        let is_joined = next.start <= last.end;
-        last.end = if is_joined { next.end } else { last.end };
-        is_joined
-    });
-    pieces
 }
 
 /// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again. Every
@@ -129,16 +88,6 @@ pub fn note(flight: &Prepared) -> String {
         "effects are looked for in {:.0} s of it, in {parts}; their parameters are fitted on all of it",
         flight.compared_s()
     )
-}
-
-/// Uses of a part of a long flight, as a note for the report; `None` of a flight that stays whole.
-pub fn part_note(flight: &Prepared) -> Option<String> {
-    let is_long = FLIGHT_S / flight.compared_s() < MOST;
-    let uses = match flight.flight.role {
-        Role::Test => "its clocks are aligned",
-        Role::Fit | Role::Select => "its clocks are aligned and its prediction errors computed",
-    };
-    is_long.then(|| format!("{uses} by {FLIGHT_S} s of it, spread evenly"))
 }
 
 #[cfg(test)]

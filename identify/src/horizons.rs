@@ -2,9 +2,9 @@
 
 use crate::clock::Lateness;
 use crate::disturbance::{DisturbanceModels, Observed};
-use crate::excerpt;
 use crate::fit::Problem;
 use crate::forecast::Forecast;
+use crate::parts;
 use crate::past_wind::{Stage, stages};
 use crate::predict::{Errors, Measured, WindowEnd, components, errors};
 use crate::prepared::Prepared;
@@ -63,7 +63,7 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
         let late = prepared.map_or(Lateness::default(), |prepared| prepared.late);
         // A test flight is judged whole, as on the bus.
-        let part = prepared.filter(|_| flight.role != Role::Test).and_then(excerpt::of_flight);
+        let part = prepared.filter(|_| flight.role != Role::Test).and_then(parts::of_flight);
         let pieces_s = part.as_ref().map_or(Vec::new(), |part| part.layout.clock.pieces_s());
         let settling_s = part.as_ref().map_or(0.0, Prepared::settling_s);
         let cut = part.is_some().then(|| flight.within(&pieces_s));

@@ -9,7 +9,7 @@
 //! | [`run`], `error` | the whole way, from flights to a report; reasons why it is not gone |
 //! | `clock`, `track` | measured channels on a grid of instants |
 //! | `rotor_track`, `spinning` | the rotors on that grid, and those that follow from commands |
-//! | `excerpt` | the parts of long flights in which effects are looked for |
+//! | `parts`, `excerpt` | pieces of long flights; those in which effects are looked for |
 //! | `window` | the window, and differences that lose nothing |
 //! | `prepared`, `rows` | a flight, the equations that it allows, and their rows |
 //! | `model`, `memo` | the model's side of the equations, and what was computed of it lately |
@@ -95,6 +95,7 @@ mod noise_model;
 mod normal;
 mod offset;
 mod parameter;
+mod parts;
 mod past_wind;
 mod predict;
 mod prepared;

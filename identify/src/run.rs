@@ -20,6 +20,7 @@ use crate::misfit::misfits;
 use crate::model::Model;
 use crate::noise;
 use crate::parameter::Parameters;
+use crate::parts;
 use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
 use crate::questions::OpenQuestions;
 use crate::ratios::Ratios;
@@ -396,7 +397,7 @@ fn flight_report(flight: &Flight, prepared: Option<&Prepared>) -> FlightReport {
 fn note_parts(problem: &Problem, reports: &mut [FlightReport]) {
     for flight in problem.flights() {
         let of_flight = reports.iter_mut().filter(|report| report.name == flight.flight.name);
-        of_flight.for_each(|report| report.notes.extend(excerpt::part_note(flight)));
+        of_flight.for_each(|report| report.notes.extend(parts::note(flight)));
     }
 }
 
