@@ -7,8 +7,9 @@
 use crate::disturbance::{DisturbanceModels, Observed};
 use crate::fit::{Equations, Problem};
 use crate::fit_result::FitResult;
+use crate::measured::Measured;
 use crate::noise;
-use crate::predict::{Measured, WindowEnd, components};
+use crate::predict::{WindowEnd, components};
 use crate::prepared::Prepared;
 use crate::sensing::SensorErrors;
 use crate::statistics::chance_of_no_gain;

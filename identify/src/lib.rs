@@ -29,7 +29,7 @@
 //! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
 //! | `sensing`, `rotor_speed_filter` | the sensors' delays, biases and filters, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
-//! | `predict`, `forecast`, `horizons` | prediction over horizons, and tables of its errors |
+//! | `measured`, `predict`, `forecast`, `horizons` | measured states of a flight; prediction over horizons, and tables of its errors |
 //! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
 //! | `foresight`, `loss`, `misfit` | predictions, and residuals of each moment, as a judge of effects and of the verdict |
 //! | `refine` | parameters moved to where predictions are best |
@@ -86,6 +86,7 @@ mod log_rates;
 mod logged_voltage;
 mod logging;
 mod loss;
+mod measured;
 mod memo;
 mod misfit;
 mod model;
@@ -156,8 +157,8 @@ pub use unusable::Unusable;
 #[doc(hidden)]
 pub mod steps {
     pub use crate::fit::Problem;
+    pub use crate::measured::Measured;
     pub use crate::parameter::{Parameter, Parameters};
-    pub use crate::predict::Measured;
     pub use crate::sensor_effects::{
         ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, ROTOR_SPEED_FILTER, SENSOR_BIAS, SENSOR_DELAY,
     };

@@ -4,8 +4,9 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::forecast::{AddedAcceleration, Forecast};
+use crate::measured::{Measured, SLACK_S};
 use flights::state::{StateQuantity, VehicleState, WindowEndErrors};
-use flights::{Channel, Flight, Played, Row};
+use flights::{Channel, Flight, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use plant::{Airframe, Backend, FreeFlight, NewtonEuler, PerRotor, RigidBody, RotorState};
 use std::collections::BTreeMap;
@@ -20,22 +21,6 @@ pub(crate) const ROTOR_TICK_S: f64 = 0.0025;
 const LONG_ROTOR_TICK_S: f64 = 0.005;
 /// Part by which the period of such a log may be shorter.
 const PERIOD_SLACK: f64 = 0.02;
-/// Times are sums of decimal fractions: a nanosecond of slack keeps the last moment.
-const SLACK_S: f64 = 1e-9;
-
-/// The measured states of a flight, as a player plays them.
-#[derive(Debug)]
-pub struct Measured {
-    played: Played,
-    /// Rotor speeds in place of commands.
-    rotor_speed: Option<Channel<ROTORS_MAX>>,
-    /// Pieces of the flight in which windows lie, from first to last moment in s; empty where they lie anywhere.
-    pieces_s: Vec<(f64, f64)>,
-    /// Time from a piece's begin to its first window, in s.
-    settling_s: f64,
-    /// True if the model does not turn by itself: its attitude and rates are the measured ones.
-    turns_as_measured: bool,
-}
 
 /// Root mean squares at the ends of windows, by channel.
 pub type Errors = BTreeMap<&'static str, f64>;
@@ -54,33 +39,6 @@ pub struct WindowEnd {
 }
 
 impl Measured {
-    /// The states of `flight`; `None` where it has neither commands nor rotor speeds, or no motion.
-    pub fn of(flight: &Flight) -> Option<Self> {
-        let is_commanded = !flight.command.is_empty();
-        if !is_commanded && flight.rotor_speed.is_empty() {
-            return None;
-        }
-        let rotor_speed = (!is_commanded).then(|| flight.rotor_speed.clone());
-        Some(Self {
-            played: Played::of(flight).ok()?,
-            rotor_speed,
-            pieces_s: Vec::new(),
-            settling_s: 0.0,
-            turns_as_measured: false,
-        })
-    }
-
-    /// With windows in these pieces of the flight alone, each behind the time in which rotors settle that are simulated from its begin on.
-    pub fn within(self, pieces_s: Vec<(f64, f64)>, settling_s: f64) -> Self {
-        Self { pieces_s, settling_s, ..self }
-    }
-
-    /// With the measured attitude and rates in place of predicted ones, so that the errors are due to forces
-    /// alone.
-    pub fn turning_as_measured(self) -> Self {
-        Self { turns_as_measured: true, ..self }
-    }
-
     /// Errors of `airframe` at the ends of windows of `horizon_s`.
     pub fn predicted(&self, flight: &Flight, airframe: Airframe, horizon_s: f64) -> Errors {
         errors(flight, &self.ends(airframe, horizon_s, |_| Forecast::none()), |end| end.simulated)
@@ -175,22 +133,6 @@ impl Measured {
             }
         }
         ends
-    }
-
-    /// The first moment from `from_s` on with a whole window in a piece.
-    fn next_window_s(&self, from_s: f64, window_s: f64) -> f64 {
-        if self.pieces_s.is_empty() {
-            return from_s;
-        }
-        let next = self.pieces_s.iter().find(|piece| from_s.max(piece.0) + window_s <= piece.1);
-        next.map_or(f64::INFINITY, |piece| from_s.max(piece.0))
-    }
-
-    /// True if the window lies in a piece, with rotors that have settled.
-    fn is_chosen(&self, from_s: f64, to_s: f64) -> bool {
-        let holds =
-            |piece: &(f64, f64)| piece.0 + self.settling_s <= from_s + SLACK_S && to_s <= piece.1 + SLACK_S;
-        self.pieces_s.is_empty() || self.pieces_s.iter().any(holds)
     }
 }
 

@@ -2,8 +2,8 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
 use crate::clock::{Clock, Lateness};
+use crate::measured::Measured;
 use crate::memo::{Memo, Recent};
-use crate::predict::Measured;
 use crate::rig;
 use crate::rotor_speed_filter::SpeedFilter;
 use crate::rotor_track::{EachRotor, Rotors};
