@@ -5,14 +5,15 @@
 )]
 
 use crate::fit_result::FitResult;
-use crate::model::Model;
 use crate::normal::{self, Block};
 use crate::prepared::Prepared;
 use crate::rows::keep_means;
-use crate::whitening::{Noises, Whitening, components};
+use crate::whitening::{Whitening, components};
 use nalgebra::{DMatrix, DVector};
 use plant::effects::{EffectKind, Requirement};
 use rayon::prelude::*;
+
+pub use crate::problem::Problem;
 
 /// Steps of a fit at most.
 const STEPS_MAX: usize = 12;
@@ -26,27 +27,6 @@ const CHORD_STEPS_MAX: usize = 5;
 const FOLDS: usize = 10;
 /// A fit is done when a step changes every parameter by less than this part of its standard deviation.
 const SMALL_STEP: f64 = 0.02;
-
-/// An estimation problem: flights, the model that they are held against, and how.
-#[derive(Debug)]
-pub struct Problem<'f> {
-    /// The model.
-    pub model: Model,
-    /// Estimation data: flights that parameters are fitted on.
-    pub estimation: Vec<Prepared<'f>>,
-    /// Validation data: flights that effects are chosen on. Where there are none, they are chosen by cross-validation over
-    /// blocks of the estimation data.
-    pub validation: Vec<Prepared<'f>>,
-    /// Test data: flights that errors are reported on, and that decide nothing.
-    pub test: Vec<Prepared<'f>>,
-    /// The noise of each component, by which its residual is whitened and weighed.
-    pub noises: Noises,
-    /// Length of the blocks that count as independent.
-    pub block_s: f64,
-    /// Mean lateness of the attitudes of the estimation data against the gyroscopes, in s: a fit of their delay
-    /// starts there.
-    pub shared_late_s: f64,
-}
 
 /// Equations of the estimation data.
 #[derive(Debug, Clone)]
@@ -85,17 +65,7 @@ impl Equations {
     }
 }
 
-impl<'f> Problem<'f> {
-    /// Iterates over all flights, the estimation data first.
-    pub fn flights(&self) -> impl Iterator<Item = &Prepared<'f>> {
-        self.estimation.iter().chain(&self.validation).chain(&self.test)
-    }
-
-    /// The same, to be changed.
-    pub fn flights_mut(&mut self) -> impl Iterator<Item = &mut Prepared<'f>> {
-        self.estimation.iter_mut().chain(&mut self.validation).chain(&mut self.test)
-    }
-
+impl Problem<'_> {
     /// Fits the parameters `free`, starting from `start`: Gauss-Newton steps, each followed by chord steps, which keep the
     /// derivatives.
     pub fn fitted(&self, start: &[f64], free: &[usize]) -> FitResult {
@@ -550,17 +520,14 @@ impl Problem<'_> {
         };
         flights.iter().map(of).sum::<usize>().max(1)
     }
-
-    /// The shortest delay that the grids can tell from zero.
-    pub fn least_delay_s(&self) -> f64 {
-        0.5 * self.flights().map(|flight| flight.layout.clock.step_s).fold(0.0, f64::max)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
     use crate::parameter::Parameters;
+    use crate::whitening::Noises;
     use vehicles::Vehicle;
 
     /// No moment of inertia of a rigid body is larger than the sum of the other two.

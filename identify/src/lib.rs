@@ -19,7 +19,7 @@
 //! | `candidate` | which effects these flights can show |
 //! | `flight_wind`, `wind_search`, `wind_start`, `wind_reports`, `past_wind` | one wind for each flight; the search for several; where a fit of it starts; its report; that of a test flight as its past shows it |
 //! | `noise_model`, `whitening` | the noise of a residual: autoregressive within a flight, trims between flights |
-//! | `normal`, `fit`, `fit_result` | generalised least squares over blocks of time: an estimation problem and its result |
+//! | `problem`, `normal`, `fit`, `fit_result` | an estimation problem; generalised least squares over blocks of time, and their result |
 //! | `logging` | timing errors that slowly logged commands make |
 //! | `select`, `judgement`, `revision`, `simpler`, `confounded` | the stepwise search for the effects that the flights ask for, its revision by predictions, one effect instead of two, and their rivals |
 //! | `ratios`, `instruments` | what flights determine that show rotation alone, and its fit by instrumental variables |
@@ -100,6 +100,7 @@ mod parts;
 mod past_wind;
 mod predict;
 mod prepared;
+mod problem;
 pub mod proposal;
 mod questions;
 mod ratios;
