@@ -1,6 +1,6 @@
 //! Reasons why flights cannot be used for identification.
 
-use crate::faults::Fault;
+use crate::fault::Fault;
 use diagnostics::Diagnostic;
 use flights::{Flight, FlightSet, Role};
 

@@ -3,7 +3,6 @@
 //!
 //! | room | contents |
 //! |---|---|
-//! | `fault` | a fault and its consequence |
 //! | `evidence`, `twin`, `frozen` | comparison of channels; frozen numbers |
 //! | `gyroscope`, `accelerometer`, `position`, `command` | faults of these channels |
 //! | `order` | commands and rotor speeds in another order, reversed spins |
@@ -13,7 +12,6 @@
 mod accelerometer;
 mod command;
 mod evidence;
-mod fault;
 mod frozen;
 mod gyroscope;
 mod order;
@@ -22,11 +20,9 @@ mod rotor_speed;
 mod trim;
 mod twin;
 
-pub use fault::Fault;
-
+use crate::fault::{Fault, Part};
 use crate::fit::Problem;
 use evidence::Evidence;
-use fault::Part;
 use flights::FlightSet;
 
 /// Returns the faults of the channels of `set`, from which `problem` was made, and the set without the faulty channels;

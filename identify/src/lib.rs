@@ -26,7 +26,7 @@
 //! | `questions`, `evidence`, `log_rates` | open questions, and what a simulated flight would say on them |
 //! | [`proposal`] | the next flight, as reports hold it |
 //! | `rig` | flights of vehicles that a rig holds |
-//! | `align`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted |
+//! | `align`, `fault`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted; a fault and its consequence |
 //! | `sensing`, `rotor_speed_filter` | the sensors' delays, biases and filters, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `measured`, `predict`, `forecast`, `horizons` | measured states of a flight; prediction over horizons, and tables of its errors |
@@ -70,6 +70,7 @@ mod envelope;
 mod error;
 mod evidence;
 mod excerpt;
+mod fault;
 mod faults;
 mod fit;
 mod fit_result;
@@ -144,7 +145,7 @@ pub mod worth;
 pub use clock::Lateness;
 pub use envelope::Reached;
 pub use evidence::Evidence;
-pub use faults::Fault;
+pub use fault::Fault;
 pub use log_rates::LogRates;
 pub use prepared::Equation;
 pub use questions::{OpenQuestions, Question};

@@ -4,7 +4,7 @@ use crate::align::{Offset, Offsets};
 use crate::candidate::Unidentifiable;
 use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
-use crate::faults::Fault;
+use crate::fault::Fault;
 use crate::limits::Limits;
 use crate::loss::{Loss, advice};
 use crate::proposal::Proposal;

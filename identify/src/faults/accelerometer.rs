@@ -6,9 +6,9 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use super::evidence::Evidence;
-use super::fault::{Fault, Part, axis_name};
 use super::frozen::longest;
 use super::twin::{Twin, is_off_scale};
+use crate::fault::{Fault, Part, axis_name};
 use crate::prepared::Equation;
 use crate::statistics::mean;
 

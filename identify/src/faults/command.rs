@@ -4,9 +4,9 @@
 #![allow(non_snake_case, reason = "a trailing _B names the frame a vector is written in")]
 
 use super::evidence::Evidence;
-use super::fault::{Fault, Part};
 use super::frozen::{Stretch, longest};
 use super::order::{Drive, swapped};
+use crate::fault::{Fault, Part};
 use crate::prepared::Equation;
 use crate::statistics::{deviation, mean};
 

@@ -1,8 +1,8 @@
 //! Comparisons of a flight's channels with each other, at the knots of its windows.
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
 
-use super::fault::Part;
 use super::twin::Twin;
+use crate::fault::Part;
 use crate::model::Model;
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
 use crate::rotor_track::EachRotor;

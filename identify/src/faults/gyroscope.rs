@@ -1,9 +1,9 @@
 //! Gyroscopes: frozen, and against the attitude scaled or mirrored on an axis, or without any relation to it.
 
 use super::evidence::Evidence;
-use super::fault::{Fault, Part, axis_name};
 use super::frozen::longest;
 use super::twin::{Twin, is_off_scale};
+use crate::fault::{Fault, Part, axis_name};
 
 /// Shortest stretch of equal numbers that counts as frozen.
 const FROZEN_S: f64 = 0.5;

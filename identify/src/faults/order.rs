@@ -6,7 +6,7 @@
 //! Commands on another clock pass for none of them: the declared order is tried at times far from the motion's, too.
 
 use super::evidence::Evidence;
-use super::fault::{Fault, Part};
+use crate::fault::{Fault, Part};
 use crate::prepared::Equation;
 use crate::rotor_track::EachRotor;
 use nalgebra::Vector3;

@@ -1,8 +1,8 @@
 //! Positions: jumps, frozen, mirrored on an axis.
 
 use super::evidence::Evidence;
-use super::fault::{Fault, Part, axis_name};
 use super::frozen::longest;
+use crate::fault::{Fault, Part, axis_name};
 use flights::{Flight, Role};
 
 /// Shortest stretch of equal numbers that counts as frozen: motion capture resolves less than a vehicle moves.

@@ -4,8 +4,8 @@
 //! decides: the speed that explains the measured forces and torques better is believed. This is done flight by flight: a
 //! sensor that reads half in one of six flights reads 0.917 in the mean, which no threshold detects.
 
-use super::fault::{Fault, Part};
 use super::twin::is_off_scale;
+use crate::fault::{Fault, Part};
 use crate::fit::Problem;
 use crate::prepared::{Equation, Prepared};
 use crate::rows::column;

@@ -4,7 +4,7 @@
 //! in the mean they carry the weight, without another torque. The vehicle file alone gives the largest torque about one
 //! axis under these conditions.
 
-use super::fault::{Fault, axis_name};
+use crate::fault::{Fault, axis_name};
 use crate::fit::Problem;
 use crate::prepared::{Equation, Prepared};
 use crate::rows::column;
