@@ -141,23 +141,24 @@ impl Clocks {
     }
 }
 
+/// The problem without the lateness of its clocks, and the offsets that were found for each of its flights.
+///
 /// Removes from each flight the lateness of its attitude beyond the mean of the estimation data. Position and
 /// velocity move with the attitude; if they differ from it, their own lateness beyond that mean is removed.
-/// Only offsets that are certain are removed. Returns the offsets that were found for each flight of `fit` and
-/// then of `test`.
-pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
-    let noises = std::mem::replace(&mut problem.noises, kinematic_noises());
-    let flights: Vec<&Prepared> = problem.flights().collect();
+/// Only offsets that are certain are removed.
+pub fn align(problem: Problem<'_>) -> (Problem<'_>, Vec<(String, Offsets)>) {
+    let noises = problem.noises;
+    let kinematic = Problem { noises: kinematic_noises(), ..problem };
+    let flights: Vec<&Prepared> = kinematic.flights().collect();
     let of_flight = |flight: &&Prepared| {
         let part = parts::of_flight(flight);
-        Clocks::of(problem, part.as_ref().unwrap_or(flight))
+        Clocks::of(&kinematic, part.as_ref().unwrap_or(flight))
     };
     let clocks: Vec<Clocks> = flights.par_iter().map(of_flight).collect();
-    problem.noises = noises;
     let of_fit: Vec<Found> =
-        clocks[..problem.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();
+        clocks[..kinematic.estimation.len()].iter().filter_map(|shift| shift.attitude).collect();
     let shared = Found::mean(&of_fit);
-    problem.shared_late_s = shared.late_s;
+    let mut problem = Problem { noises, shared_late_s: shared.late_s, ..kinematic };
     let least_s = problem.least_delay_s() / 2.0;
     let mut offsets = Vec::new();
     for (flight, shift) in problem.flights_mut().zip(clocks) {
@@ -172,5 +173,5 @@ pub fn align(problem: &mut Problem) -> Vec<(String, Offsets)> {
         ];
         offsets.push((flight.flight.name.clone(), Offsets::from(of_flight)));
     }
-    offsets
+    (problem, offsets)
 }

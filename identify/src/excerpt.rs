@@ -42,19 +42,20 @@ fn shortened<'f>(problem: &Problem<'f>, time_s: f64) -> Option<Problem<'f>> {
     })
 }
 
-/// The selection that was `found` in an excerpt of `problem`, with the parameters fitted on all of it, and refined by prediction errors again. Every
-/// effect is tested once more by them: one with a parameter at its bound is withdrawn, and one that is not beyond chance beside the others.
-pub fn on_all(problem: &mut Problem, excerpt: &Problem, found: Selection) -> Selection {
-    problem.noises = excerpt.noises.clone();
+/// The problem with the noises of its `excerpt`, and the selection that was `found` there, with the parameters fitted on all of it, and refined by
+/// prediction errors again. Every effect is tested once more by them: one with a parameter at its bound is withdrawn, and one that is not beyond
+/// chance beside the others.
+pub fn on_all<'f>(problem: Problem<'f>, excerpt: &Problem, found: Selection) -> (Problem<'f>, Selection) {
+    let problem = Problem { noises: excerpt.noises.clone(), ..problem };
     let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
     let mut found = Selection { before, ..found };
     loop {
-        let unsound = match fitted_on_all(problem, &found) {
-            Ok((after, refined)) => return Selection { after, refined, ..found },
+        let unsound = match fitted_on_all(&problem, &found) {
+            Ok((after, refined)) => return (problem, Selection { after, refined, ..found }),
             Err(unsound) => unsound,
         };
         (found.accepted, found.after) =
-            without_effects(problem, &found.accepted, &found.after, &[unsound.effect]);
+            without_effects(&problem, &found.accepted, &found.after, &[unsound.effect]);
         found.worths.remove(unsound.effect);
         found.without_worth.remove(unsound.effect);
         found.withdrawn.push(unsound);

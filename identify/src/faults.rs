@@ -81,15 +81,14 @@ fn of_rotor_speeds(flights: &[Evidence]) -> Found {
     flights.iter().zip(ordered).map(one).collect()
 }
 
-/// Returns the faults of rotors and of trims. Faulty rotor sensors are distrusted in `problem`; flights with an impossible
-/// trim are removed from it.
-pub fn of_rotors(problem: &mut Problem) -> Vec<Fault> {
-    let mut faults = rotor_speed::find(problem);
-    let trims = trim::find(problem);
+/// Returns `problem` without faulty rotor sensors and without flights that have an impossible trim, and the faults of both.
+pub fn of_rotors(mut problem: Problem<'_>) -> (Problem<'_>, Vec<Fault>) {
+    let mut faults = rotor_speed::find(&mut problem);
+    let trims = trim::find(&problem);
     let is_used = |name: &str| !trims.iter().any(|fault| fault.flight == name);
     for flights in [&mut problem.estimation, &mut problem.validation, &mut problem.test] {
         flights.retain(|flight| is_used(&flight.flight.name));
     }
     faults.extend(trims);
-    faults
+    (problem, faults)
 }

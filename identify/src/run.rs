@@ -118,25 +118,32 @@ pub fn identify_until(
     progress("preparing flights");
     let (mut faults, believed) = believed(&vehicle, &declared, set)?;
     let set = believed.as_ref().unwrap_or(set);
-    let (mut problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
-    problem.number_flights();
+    let (problem, mut flight_reports, offsets) = aligned(&vehicle, &declared, set, &mut faults)?;
+    let problem = problem.numbered();
     let all: Vec<&Prepared> = problem.flights().collect();
     let (open, unidentifiable) = candidates(&problem.model.parameters, &all);
-    let mut excerpt = excerpt(&problem);
-    let searched = excerpt.as_mut().unwrap_or(&mut problem);
-    let mut selection = select(searched, &open, progress, is_stopped);
-    progress("confounded effects");
-    let mut effects = effect_reports::judged(searched, &selection);
-    let mut rivals = rivals(searched, &selection, &open);
     note_parts(&problem, &mut flight_reports);
-    if let Some(excerpt) = &excerpt {
-        progress("parameters on all flights");
-        let of_excerpt = selection.accepted.clone();
-        selection = on_all(&mut problem, excerpt, selection);
-        let mut of_excerpt = of_excerpt.iter();
-        rivals.retain(|_| of_excerpt.next().is_some_and(|one| selection.accepted.contains(one)));
-        note_excerpt(excerpt, &mut flight_reports);
-    }
+    // Effects are looked for in an excerpt of long flights, or else in all there is.
+    let (searched, whole) = match excerpt(&problem) {
+        Some(excerpt) => (excerpt, Some(problem)),
+        None => (problem, None),
+    };
+    let (searched, selection) = select(searched, &open, progress, is_stopped);
+    progress("confounded effects");
+    let mut effects = effect_reports::judged(&searched, &selection);
+    let mut rivals = rivals(&searched, &selection, &open);
+    let (problem, selection) = match whole {
+        None => (searched, selection),
+        Some(whole) => {
+            progress("parameters on all flights");
+            let of_excerpt = selection.accepted.clone();
+            let (whole, selection) = on_all(whole, &searched, selection);
+            let mut of_excerpt = of_excerpt.iter();
+            rivals.retain(|_| of_excerpt.next().is_some_and(|one| selection.accepted.contains(one)));
+            note_excerpt(&searched, &mut flight_reports);
+            (whole, selection)
+        }
+    };
     effect_reports::add_accepted(&problem, &selection, &rivals, &mut effects);
     effect_reports::add_undetermined(&problem, &selection, &unidentifiable, &mut effects);
     note_logging(&problem, &selection, &mut flight_reports);
@@ -250,10 +257,11 @@ fn aligned<'f>(
     set: &'f FlightSet,
     faults: &mut Vec<Fault>,
 ) -> Result<Aligned<'f>, IdentifyError> {
-    let (mut problem, reports) =
+    let (problem, reports) =
         problem(vehicle, declared, set).map_err(|cause| faulty(faults, set).unwrap_or(cause))?;
-    let offsets = align(&mut problem);
-    faults.extend(faults::of_rotors(&mut problem));
+    let (problem, offsets) = align(problem);
+    let (problem, of_rotors) = faults::of_rotors(problem);
+    faults.extend(of_rotors);
     for (role, flights) in [(Role::Fit, &problem.estimation), (Role::Test, &problem.test)] {
         if flights.is_empty() {
             return Err(faulty(faults, set).unwrap_or_else(|| no_flight(role, &[])));

@@ -112,18 +112,20 @@ impl Selection {
 
 /// Selects among `candidates`, telling `progress` of each step, until it ends or `is_stopped` says so between two rounds.
 ///
-/// In the end effects without which predictions are better are taken back, and the search goes on without them.
-pub fn select(
-    problem: &mut Problem,
+/// In the end effects without which predictions are better are taken back, and the search goes on without them. The problem comes back with the
+/// noises by which its last fit was weighed.
+pub fn select<'f>(
+    mut problem: Problem<'f>,
     candidates: &[Candidate],
     progress: &mut dyn FnMut(&str),
     is_stopped: &dyn Fn() -> bool,
-) -> Selection {
+) -> (Problem<'f>, Selection) {
     let declared = problem.model.parameters.baseline();
     let base = problem.fitted(&declared, &[]);
     let mut search = StepwiseSearch { accepted: Vec::new(), rounds: Vec::new(), base };
-    search.begin_in_several_winds(problem, candidates, progress);
-    search.finished(problem, candidates, progress, is_stopped)
+    search.begin_in_several_winds(&mut problem, candidates, progress);
+    let selection = search.finished(&mut problem, candidates, progress, is_stopped);
+    (problem, selection)
 }
 
 /// State of a selection.
@@ -634,7 +636,7 @@ mod tests {
     fn stopped_before(round: usize) -> Selection {
         let vehicle = with_light_rotors();
         let set = simulated(&vehicle, &[effect("mass-error", &[("error", 0.2)])]);
-        let (mut problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
+        let (problem, _) = problem(&vehicle, &[], &set).expect("usable flights");
         let candidates =
             ["mass-error", "thrust-scale", "inertia-error"].map(|name| candidate(&problem, name));
         let asked = Cell::new(0);
@@ -642,7 +644,7 @@ mod tests {
             asked.set(asked.get() + 1);
             asked.get() >= round
         };
-        select(&mut problem, &candidates, &mut |_| (), &is_stopped)
+        select(problem, &candidates, &mut |_| (), &is_stopped).1
     }
 
     #[test]

@@ -109,7 +109,7 @@ mod tests {
         let vehicle = hummingbird();
         let propulsion = Propulsion::of(&vehicle);
         let prepared = |flight| Prepared::new(flight, None, &propulsion).expect("a usable flight");
-        let mut problem = Problem {
+        let problem = Problem {
             model: Model { parameters: Parameters::of(&vehicle, &[]), vehicle },
             estimation: flights.iter().map(prepared).collect(),
             validation: Vec::new(),
@@ -118,8 +118,7 @@ mod tests {
             block_s: 1.0,
             shared_late_s: 0.0,
         };
-        problem.number_flights();
-        problem
+        problem.numbered()
     }
 
     /// All candidates that the flights can show.

@@ -24,17 +24,18 @@ const RIDGE: f64 = 0.01;
 const LEAST_SLOPE: f64 = 1e-6;
 
 impl Problem<'_> {
-    /// Numbers the fit flights that can show a wind of their own, and adds the parameters of these winds. Nothing changes where there are less
-    /// than two such flights, or flights that effects are chosen on: no fit knows the winds of these.
-    pub fn number_flights(&mut self) {
+    /// The problem with numbers for the fit flights that can show a wind of their own, and with the parameters of these winds. Nothing changes
+    /// where there are less than two such flights, or flights that effects are chosen on: no fit knows the winds of these.
+    pub fn numbered(mut self) -> Self {
         let shows: Vec<bool> = self.estimation.iter().map(|flight| self.shows_wind(flight)).collect();
         let count = shows.iter().filter(|shows| **shows).count();
         if count < 2 || !self.validation.is_empty() {
-            return;
+            return self;
         }
         let shown = self.estimation.iter_mut().zip(shows).filter(|(_, shows)| *shows);
         shown.enumerate().for_each(|(number, (flight, _))| flight.number = Some(number));
         self.model.parameters.add_winds(&self.model.vehicle, count);
+        self
     }
 
     fn shows_wind(&self, flight: &Prepared) -> bool {
@@ -184,7 +185,7 @@ mod tests {
             .collect();
         let test = prepared.split_off(3);
         let drag = plant::effects::find("rotor-drag").expect("an effect").nominal();
-        let mut problem = Problem {
+        let problem = Problem {
             model: Model { parameters: Parameters::of(&vehicle, &[drag]), vehicle },
             estimation: prepared,
             validation: Vec::new(),
@@ -193,8 +194,7 @@ mod tests {
             block_s: 1.0,
             shared_late_s: 0.0,
         };
-        problem.number_flights();
-        problem
+        problem.numbered()
     }
 
     fn flights() -> Vec<Flight> {
@@ -354,11 +354,10 @@ mod tests {
         assert_eq!(numbers(&problem), [Some(0), Some(1), Some(2), None]);
         problem.block_s = 5.0;
         problem.estimation.iter_mut().for_each(|flight| flight.number = None);
-        problem.number_flights();
+        let mut problem = problem.numbered();
         assert_eq!(numbers(&problem), [None; 4], "three blocks a flight");
         problem.block_s = 1.0;
         problem.validation = problem.estimation.split_off(2);
-        problem.number_flights();
-        assert_eq!(numbers(&problem), [None; 4], "a flight to choose on");
+        assert_eq!(numbers(&problem.numbered()), [None; 4], "a flight to choose on");
     }
 }
