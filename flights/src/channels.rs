@@ -65,6 +65,17 @@ pub fn read_yaw(log: &dyn Log, entry: &Entry) -> Result<Option<Channel<1>>, LogE
     Ok(Some(Channel { time_s: samples.time_s, values }))
 }
 
+/// A pitch is a right angle at most, but for noise.
+const PITCH_MAX_DEG: f64 = 93.0;
+
+/// The largest size among angles, besides a bad sample or two; 0 of none.
+fn usual_largest<'a>(angles: impl Iterator<Item = &'a f64>) -> f64 {
+    const BAD: f64 = 0.02;
+    let mut sizes: Vec<f64> = angles.map(|angle| angle.abs()).filter(|size| size.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(((1.0 - BAD) * sizes.len() as f64) as usize).copied().unwrap_or(0.0)
+}
+
 /// The samples of `names`: their signs, then the entry's `scale`, then its `offset` applied.
 fn scaled_samples(log: &dyn Log, entry: &Entry, names: &[Name]) -> Result<Samples, LogError> {
     let scales = scaling::each(Spot::Key("scale"), entry.scale.as_ref(), 1.0, names.len())?;
@@ -122,19 +133,30 @@ impl<'a> Layout<'a> {
     }
 
     /// Roll and pitch in rad come to more than a turn, and not in a bad sample or two, only if they are in degrees.
+    /// The pitch of the sequence z-y-x lies within a right angle: beyond it are tenths of degrees, or another angle.
     fn check_angles(&self, rows: &NumberRows) -> Result<(), LogError> {
-        const BAD: f64 = 0.02;
-        let tilts = rows.iter().flat_map(|row| row.iter().take(2)).filter(|angle| angle.is_finite());
-        let mut sizes: Vec<f64> = tilts.map(|angle| angle.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let largest = sizes.get(((1.0 - BAD) * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
-        let is_in_rad = self.shape == Shape::Euler && self.factor > 0.5;
-        let is_plausible = !is_in_rad || largest <= std::f64::consts::TAU;
-        is_plausible.then_some(()).ok_or_else(|| {
+        if self.shape != Shape::Euler {
+            return Ok(());
+        }
+        let largest = usual_largest(rows.iter().flat_map(|row| row.iter().take(2)));
+        if self.factor > 0.5 && largest > std::f64::consts::TAU {
             let found = format!("up to {largest:.1}, more than a turn");
             let advice = "write `unit = \"deg\"`, which would fit, or set `trust_units = true`";
-            LogError::unexpected(Spot::Whole, "roll and pitch in rad", found, advice)
-        })
+            return Err(LogError::unexpected(Spot::Whole, "roll and pitch in rad", found, advice));
+        }
+        let pitch_deg = (self.factor * usual_largest(rows.iter().filter_map(|row| row.get(1)))).to_degrees();
+        if pitch_deg > PITCH_MAX_DEG {
+            let found = format!("up to {pitch_deg:.0} degrees");
+            let advice = "correct the order of `euler` or its `unit`, or set `scale = 0.1` for tenths of a degree; if the angles are \
+                          right, set `trust_units = true`";
+            return Err(LogError::unexpected(
+                Spot::Whole,
+                "a pitch of at most 90 degrees either way",
+                found,
+                advice,
+            ));
+        }
+        Ok(())
     }
 
     /// A sample in SI units and our frames.

@@ -160,11 +160,33 @@ fn check_numbers(table: &Table, name: &str, numbers: &[f64]) -> Result<(), LogEr
     let Ok(column) = table.column(name) else { return Ok(()) };
     let filled = table.rows.iter().find(|row| !row.cell(column).is_empty());
     match filled.filter(|_| numbers.iter().all(|number| !number.is_finite())) {
-        None => Ok(()),
+        None => check_digits(table, column, name, numbers),
         Some(row) => {
             let at = Spot::Cell { line: row.line, column: shown(name) };
             let advice = "no cell of the column holds one: name another column, or set `csv.decimal` or `csv.delimiter`";
             Err(LogError::unexpected(at, "a number", format!("`{}`", shown(row.cell(column))), advice))
+        }
+    }
+}
+
+/// Refuses a column in which more than one of twenty filled cells has digits and is no number, such as `(0.5)` or `1,234.5`.
+/// If these cells were left out, the rest would be chosen by its values. Words for NaN with digits have a `#`, as `-1.#IND`.
+fn check_digits(table: &Table, column: usize, name: &str, numbers: &[f64]) -> Result<(), LogError> {
+    const CELLS_FOR_ONE_UNREAD: usize = 20;
+    let is_unread = |cell: &str| {
+        let has_digit = cell.bytes().any(|byte| byte.is_ascii_digit());
+        has_digit && !cell.contains('#') && table.number(cell).is_none()
+    };
+    let rows = || table.rows.iter().zip(numbers);
+    let unread = || rows().filter(|(row, number)| number.is_nan() && is_unread(row.cell(column)));
+    let (count, of) = (unread().count(), rows().filter(|(row, _)| !row.cell(column).is_empty()).count());
+    match unread().next().filter(|_| CELLS_FOR_ONE_UNREAD * count > of) {
+        None => Ok(()),
+        Some((row, _)) => {
+            let at = Spot::Cell { line: row.line, column: shown(name) };
+            let found = format!("`{}`, and the like in {count} of {of} cells", shown(row.cell(column)));
+            let advice = "write the numbers without signs, marks and units of their own, such as -1234.5";
+            Err(LogError::unexpected(at, "a number", found, advice))
         }
     }
 }

@@ -126,11 +126,12 @@ impl Judge<'_> {
         let span_s = times.last()? - times.first()?;
         let is_wrong = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);
         let factor = self.units.factor(quantity);
-        let fits = |(_, other): &&(&str, f64)| {
-            let scale = other / factor;
+        let fits = |size: f64| {
+            let scale = size / factor;
             !is_wrong(scale * period_s, PERIOD_RANGE_S) && !is_wrong(scale * span_s, SPAN_RANGE_S)
         };
-        let (unit, _) = quantity.dimension().units.iter().find(fits)?;
+        let unit = quantity.dimension().units.iter().find(|(_, size)| fits(*size));
+        let fits = unit.map(|(unit, _)| of_unit(unit)).or_else(|| self.units.long_times(fits))?;
         let declared = self.units.unit(quantity);
         let what = format!(
             "declared in {declared}, its samples are {} s apart, over {} s",
@@ -138,7 +139,7 @@ impl Judge<'_> {
             digits(span_s)
         );
         (is_wrong(period_s, PERIOD_RANGE_S) && is_wrong(span_s, SPAN_RANGE_S))
-            .then(|| finding(quantity, Some(of_unit(unit)), &what))
+            .then(|| finding(quantity, Some(fits), &what))
     }
 
     /// The specific force is one, and in the body, as the vehicle accelerates.

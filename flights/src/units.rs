@@ -13,7 +13,10 @@ pub const HUNDREDS: f64 = 100.0;
 /// Counts of sensors are as near to some units as this factor: beyond it, a scale is as likely as a unit.
 const EXACT: f64 = 1.05;
 /// Units of accelerations that no channel is declared in, with their sizes in m/s^2.
-const FOREIGN_M_S2: [(&str, f64); 2] = [("mm/s^2", 1e-3), ("ft/s^2", 0.3048)];
+const FOREIGN_M_S2: [(&str, f64); 3] = [("mm/s^2", 1e-3), ("cm/s^2", 1e-2), ("ft/s^2", 0.3048)];
+/// Units of times that no channel is declared in, with their sizes in s. Spreadsheets and MATLAB count days.
+const FOREIGN_S: [(&str, f64); 3] = [("minutes", MINUTE_S), ("hours", 3600.0), ("days", 86_400.0)];
+const MINUTE_S: f64 = 60.0;
 /// A scale that is measured by the force of a flight is right within this factor: the median force is not exactly gravity's.
 const SCALE_TOLERANCE: f64 = 1.25;
 /// Values that no unit explains are refused beyond this factor.
@@ -46,7 +49,11 @@ impl Units<'_> {
             let is_derivative = matches!(quantity, Quantity::AngularVelocity | Quantity::Velocity);
             let is_exact = !is_derivative || self.unit_that_fits(quantity, factor, EXACT).is_some();
             match (is_exact, is_scaled) {
-                (true, false) => unit,
+                (true, false) => match self.exact_scale(quantity, factor) {
+                    // No flight shows the 2 % between mg and cm/s^2.
+                    Some(foreign) => format!("{unit} or {foreign}"),
+                    None => unit,
+                },
                 (true, true) => format!("{unit}, or {}", self.scale(quantity, factor)),
                 (false, _) => self.scale_before(quantity, factor, &unit),
             }
@@ -99,11 +106,28 @@ impl Units<'_> {
         Some(format!("{} with `scale = {size}` ({name})", of_unit(quantity.dimension().si())))
     }
 
+    /// The keys for times in foreign units whose sizes are `right`; `None` beside a scale that is declared already.
+    pub fn long_times(&self, right: impl Fn(f64) -> bool) -> Option<String> {
+        self.declared(Quantity::Time).filter(|entry| entry.scale.is_none())?;
+        let named = |(name, size): &(&str, f64)| format!("{} with `scale = {size}` ({name})", of_unit("s"));
+        let fitting: Vec<String> = FOREIGN_S.iter().filter(|(_, size)| right(*size)).map(named).collect();
+        (!fitting.is_empty()).then(|| fitting.join(" or "))
+    }
+
     /// The measured scale; of a sensor with the source of the exact one.
     fn measured_scale(&self, quantity: Quantity, factor: f64) -> String {
         let scale = self.scale(quantity, factor);
-        let is_of_sensor = matches!(quantity, Quantity::AngularVelocity | Quantity::SpecificForce);
-        if is_of_sensor { format!("{scale} (take the figure of the sensor's data sheet)") } else { scale }
+        // Times in minutes make everything turn faster than the gyroscope says.
+        let is_by_minutes = libm::log(factor * MINUTE_S).abs() < libm::log(EXACT);
+        match quantity {
+            Quantity::AngularVelocity if is_by_minutes => {
+                format!("`scale = {MINUTE_S}` of `time` (minutes), or {scale} here,")
+            }
+            Quantity::AngularVelocity | Quantity::SpecificForce => {
+                format!("{scale} (take the figure of the sensor's data sheet)")
+            }
+            _ => scale,
+        }
     }
 
     /// The scale with which values are right that are `factor` times too large.

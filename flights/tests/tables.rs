@@ -107,6 +107,56 @@ fn files_are_read_as_programs_write_them() {
 }
 
 #[test]
+fn minus_signs_of_unicode_are_read() {
+    let plain = Motion::default().csv();
+    assert!(plain.contains(",-"), "the log has negative numbers");
+    same("commas", load(plain.replace(",-", ",\u{2212}").as_bytes(), CHANNELS, ""));
+    let semicolons = plain.replace(',', ";").replace('.', ",").replace(";-", ";\u{2212}");
+    same("decimal commas", load(semicolons.as_bytes(), CHANNELS, ""));
+}
+
+/// The position alone, the cells of `px` written by `cell`.
+fn with_cells(cell: impl Fn(usize, &str) -> String) -> String {
+    let plain = Motion::default().csv();
+    let (header, rows) = plain.split_once('\n').unwrap();
+    let line = |(row, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[5] = cell(row, &cells[5]);
+        cells.join(";") + "\n"
+    };
+    format!("{}\n{}", header.replace(',', ";"), rows.lines().enumerate().map(line).collect::<String>())
+}
+
+/// If these cells were left out, the others would be chosen by their values.
+#[test]
+fn numbers_in_a_form_that_is_not_read_are_refused_and_words_are_not() {
+    let in_brackets = |_: usize, cell: &str| {
+        cell.strip_prefix('-').map_or_else(|| cell.to_owned(), |size| format!("({size})"))
+    };
+    let told = ["column `px`", "expected a number, found `(", "and the like in ", " of 1001 cells"];
+    says("brackets for negative numbers", load(with_cells(in_brackets).as_bytes(), CHANNELS, ""), &told);
+    let with_unit =
+        |row: usize, cell: &str| if row.is_multiple_of(3) { format!("{cell} m") } else { cell.to_owned() };
+    says(
+        "units in cells",
+        load(with_cells(with_unit).as_bytes(), CHANNELS, ""),
+        &["line 2, column `px`", " m`"],
+    );
+    for word in ["", "nan", "N/A", "-1.#IND"] {
+        let words =
+            |row: usize, cell: &str| if row.is_multiple_of(3) { word.to_owned() } else { cell.to_owned() };
+        let notes = load(with_cells(words).as_bytes(), CHANNELS, "").unwrap().notes;
+        assert!(
+            notes[0].contains("position: 334 of 1001 samples have no finite number"),
+            "{word}: {notes:?}"
+        );
+    }
+    let once =
+        |row: usize, cell: &str| if row.is_multiple_of(50) { format!("({cell})") } else { cell.to_owned() };
+    assert!(load(with_cells(once).as_bytes(), CHANNELS, "").is_ok());
+}
+
+#[test]
 fn files_that_need_a_key_are_refused_with_it() {
     let plain = Motion::default().csv();
     let rows = plain.split_once('\n').unwrap().1;

@@ -156,6 +156,48 @@ fn times_in_another_unit_are_found_before_a_part_is_cut_out() {
     }
 }
 
+/// The plain log with its times in minutes, hours or days.
+fn in_long_units(unit_s: f64) -> String {
+    let plain = Motion::default().csv();
+    let (header, rows) = plain.split_once('\n').unwrap();
+    let row = |line: &str| {
+        let (time, rest) = line.split_once(',').unwrap();
+        format!("{:.12},{rest}\n", time.parse::<f64>().unwrap() / unit_s)
+    };
+    format!("{header}\n{}", rows.lines().map(row).collect::<String>())
+}
+
+#[test]
+fn times_in_minutes_hours_and_days_are_found_with_their_scale() {
+    let place = Place::new();
+    for (name, unit_s) in [("minutes", 60.0), ("hours", 3600.0), ("days", 86_400.0)] {
+        place.write("log.csv", in_long_units(unit_s).as_bytes());
+        let text = place.load("log.csv", CHANNELS, "").unwrap_err().to_string();
+        let fits = format!("`unit = \"s\"` with `scale = {unit_s}` ({name})");
+        assert!(text.contains("flights.toml:3:") && text.contains(&fits), "{text}");
+        let scaled = CHANNELS.replacen("unit = \"s\"", &format!("unit = \"s\", scale = {unit_s}"), 1);
+        assert_eq!(place.load("log.csv", &scaled, "").unwrap().notes, [""; 0], "{name}");
+    }
+}
+
+#[test]
+fn a_pitch_beyond_a_right_angle_is_refused() {
+    let attitude = "attitude = { euler = [\"roll\", \"pitch\", \"yaw\"], unit = \"deg\" }";
+    let quaternion = "attitude = { columns = [\"qx\", \"qy\", \"qz\", \"qw\"] }";
+    let channels = CHANNELS.replace(quaternion, attitude);
+    assert_ne!(channels, CHANNELS);
+    let in_degrees = |part: f64| Motion { angle_unit: 57.295_779_5 * part, ..Motion::default() };
+    assert_eq!(read(&in_degrees(1.0), &channels, "").unwrap().notes, [""; 0]);
+    let text = read(&in_degrees(100.0), &channels, "").unwrap_err().to_string();
+    for part in
+        ["`attitude`", "a pitch of at most 90 degrees either way", "found up to", "`unit`", "`scale = 0.1`"]
+    {
+        assert!(text.contains(part), "{part} is not in: {text}");
+    }
+    let scaled = channels.replace("unit = \"deg\" }", "unit = \"deg\", scale = 0.01 }");
+    assert_eq!(read(&in_degrees(100.0), &scaled, "").unwrap().notes, [""; 0]);
+}
+
 #[test]
 fn angles_in_another_unit_are_found() {
     let poses = |unit: &str| {
@@ -292,6 +334,16 @@ fn accelerations_in_a_foreign_unit_are_advised_with_its_exact_size() {
         assert!(found.contains(&(Quantity::SpecificForce, fits)), "{per_m_s2} {declared}: {found:?}");
         let flight = read(&motion, &declare(&format!("unit = \"m/s^2\", scale = {scale}")), "").unwrap();
         assert_eq!(flight.notes, [""; 0]);
+    }
+}
+
+/// A flight does not show the 2 % between them.
+#[test]
+fn mg_and_cm_s2_are_advised_together() {
+    for per_m_s2 in [100.0, 1000.0 / 9.806_65] {
+        let found = findings(&Motion { force_unit: per_m_s2, ..Motion::default() }, CHANNELS);
+        let fits = "`unit = \"mg\"` or `unit = \"m/s^2\"` with `scale = 0.01` (cm/s^2)".to_owned();
+        assert!(found.contains(&(Quantity::SpecificForce, fits)), "{found:?}");
     }
 }
 

@@ -27,6 +27,7 @@
 //! | [`proposal`] | the next flight, as reports hold it |
 //! | `rig` | flights of vehicles that a rig holds |
 //! | `align`, `fault`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted; a fault and its consequence |
+//! | `clock_words` | clocks in the text of a report |
 //! | `sensing`, `rotor_speed_filter` | the sensors' delays, biases and filters, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `measured`, `predict`, `forecast`, `horizons` | measured states of a flight; prediction over horizons, and tables of its errors |
@@ -62,6 +63,7 @@ mod at_limit;
 pub mod brief;
 mod candidate;
 mod clock;
+mod clock_words;
 mod confounded;
 mod digits;
 mod disturbance;

@@ -7,7 +7,7 @@ const STEPS: usize = 40;
 /// No step is longer: a linearisation of the motion holds for a fraction of its fastest oscillation.
 const STEP_MAX_S: f64 = 0.02;
 /// From fewer blocks no deviation can be told.
-const LEAST_BLOCKS: usize = 5;
+pub const LEAST_BLOCKS: usize = 5;
 /// An offset is real beyond so many standard deviations.
 const SURE: f64 = 4.0;
 

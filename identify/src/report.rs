@@ -1,6 +1,6 @@
 //! Results of an identification, for programs (`report.json`) and for people.
 
-use crate::align::{Offset, Offsets};
+use crate::align::Offsets;
 use crate::candidate::Unidentifiable;
 use crate::digits::{quantity, rounded};
 use crate::envelope::Reached;
@@ -183,12 +183,6 @@ pub(crate) const UNCHECKED: &str = "no test flight has both a measured attitude 
 /// Ratio of prediction errors, new by declared, above which the new vehicle predicts worse.
 const WORSE: f64 = 1.2;
 
-/// Advice for a pose without an inertial unit.
-const NOTHING_TO_COMPARE: &str = "nothing to compare the pose with; log gyroscope and accelerometer";
-/// Advice for a pose that follows no inertial unit.
-const APART: &str = "the pose agrees with gyroscope and accelerometer at no delay up to 0.4 s; their clocks differ by more, or one \
-                     of them is wrong: set `delay_s`, or choose one clock";
-
 /// The level wind of one fit flight: the velocity of the air in the world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FlightWind {
@@ -206,15 +200,6 @@ impl FlightWind {
     pub fn speed_m_s(&self) -> f64 {
         [self.x, self.y].map(|along| along.value * along.value).iter().sum::<f64>().sqrt()
     }
-}
-
-/// A clock's offset and its correction.
-fn clock_in_words(offset: Offset) -> String {
-    let Offset { value, taken_off, .. } = offset;
-    let [size_ms, moved_ms] = [value, taken_off].map(|time_s| rounded(1e3 * time_s.abs()));
-    let late = if value < 0.0 { "early" } else { "late" };
-    let moved = if taken_off < 0.0 { "added to" } else { "taken off" };
-    format!("{size_ms} ms {late}; {moved_ms} ms were {moved} its times")
 }
 
 impl Report {
@@ -309,23 +294,7 @@ impl Report {
             let of = if all { "all flights".to_owned() } else { flights.join(", ") };
             writeln!(f, "note: {of}: {note}")?;
         }
-        for (flight, offsets) in &self.time_offsets_s {
-            let has_position =
-                |report: &FlightReport| report.name == *flight && report.equations.contains(&"acceleration");
-            if self.flights.iter().any(has_position) && offsets.values().all(Option::is_none) {
-                let has_both = |report: &FlightReport| {
-                    report.name == *flight
-                        && ["gyroscope", "specific_force"].iter().all(|of| report.equations.contains(of))
-                };
-                let advice = if self.flights.iter().any(has_both) { APART } else { NOTHING_TO_COMPARE };
-                writeln!(f, "clock: {flight}: {advice}")?;
-            }
-            for (channel, offset) in offsets {
-                let Some(offset) = offset.filter(|offset| offset.taken_off != 0.0) else { continue };
-                writeln!(f, "clock: {channel} of {flight} is {}", clock_in_words(offset))?;
-            }
-        }
-        Ok(())
+        self.write_clocks(f)
     }
 
     fn write_verdict(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -740,13 +709,6 @@ mod tests {
         assert!(text.contains("verdict: undecided. The search was stopped before its end"), "{text}");
         assert!(text.contains("Found so far: parasitic-drag\n"), "{text}");
         assert!(report.limited_use().is_some_and(|use_| use_.starts_with("not to be used")));
-    }
-
-    #[test]
-    fn a_clock_that_is_early_is_not_late_by_a_negative_time() {
-        let offset = |value: f64| Offset { value, low: value, high: value, taken_off: value };
-        assert_eq!(clock_in_words(offset(-0.01264)), "12.64 ms early; 12.64 ms were added to its times");
-        assert_eq!(clock_in_words(offset(0.01264)), "12.64 ms late; 12.64 ms were taken off its times");
     }
 
     /// An estimate stands at a limit of what is plausible also where the equations ask for hardly more.

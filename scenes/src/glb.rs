@@ -1,7 +1,8 @@
 //! Binary glTF: the triangles of a scene's nodes, each at its place.
 
 use crate::triangles::Triangles;
-use gltf::mesh::Mode;
+use gltf::accessor::DataType;
+use gltf::mesh::{Mode, Semantic};
 use nalgebra::{Matrix4, Point3};
 
 /// The triangles that `bytes` hold.
@@ -9,6 +10,7 @@ use nalgebra::{Matrix4, Point3};
 /// # Errors
 /// In words: the fault of the bytes.
 pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
+    check_head(bytes)?;
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
     let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or("it holds no scene")?;
     let mut triangles = Triangles::default();
@@ -26,6 +28,23 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Triangles, String> {
     Ok(triangles)
 }
 
+/// Refuses a file that is shorter than its head states, and one of another format. A glTF in JSON begins with a brace.
+fn check_head(bytes: &[u8]) -> Result<(), String> {
+    if !bytes.starts_with(b"glTF") {
+        let is_json = bytes.trim_ascii_start().starts_with(b"{");
+        return if is_json {
+            Ok(())
+        } else {
+            Err("it is no binary glTF, which begins with `glTF`".to_owned())
+        };
+    }
+    let stated = bytes.get(8..12).and_then(|length| length.try_into().ok()).map_or(12, u32::from_le_bytes);
+    if u64::from(stated) <= bytes.len() as u64 {
+        return Ok(());
+    }
+    Err(format!("it is cut: its head states {stated} bytes, and it has {}", bytes.len()))
+}
+
 impl Triangles {
     fn add_primitive(
         &mut self,
@@ -35,6 +54,13 @@ impl Triangles {
     ) -> Result<(), String> {
         if primitive.mode() != Mode::Triangles {
             return Err(format!("it holds {:?} where triangles are expected", primitive.mode()));
+        }
+        // The reader takes any corners for floats.
+        let is_float = |corners: gltf::Accessor<'_>| corners.data_type() == DataType::F32;
+        if !primitive.get(&Semantic::Positions).is_none_or(is_float) {
+            return Err(
+                "its corners are whole numbers (KHR_mesh_quantization): export them as floats".to_owned()
+            );
         }
         let reader = primitive.reader(|buffer| match buffer.source() {
             gltf::buffer::Source::Bin => blob,

@@ -54,6 +54,7 @@ fn binary(bytes: &[u8]) -> Triangles {
 fn text(text: &str) -> Result<Triangles, String> {
     let mut read = Triangles::default();
     let mut corners = Vec::new();
+    let mut is_open = false;
     for (number, line) in numbered(text.trim_start_matches('\u{FEFF}')) {
         let mut words = line.split_whitespace();
         let keyword = words.next().unwrap_or_default().to_ascii_lowercase();
@@ -62,7 +63,9 @@ fn text(text: &str) -> Result<Triangles, String> {
             "vertex" => corners.push(corner(words).map_err(fault)?),
             "endloop" if corners.len() == 3 => read.add_triangle(corners.drain(..)),
             "endloop" => return Err(fault(format!("a triangle ends, and has {} corners", corners.len()))),
-            "" | "solid" | "facet" | "outer" | "endfacet" | "endsolid" => {}
+            "solid" => is_open = true,
+            "endsolid" => is_open = false,
+            "" | "facet" | "outer" | "endfacet" => {}
             _ => {
                 let shown: String = keyword.chars().take(40).collect();
                 let expected =
@@ -71,7 +74,17 @@ fn text(text: &str) -> Result<Triangles, String> {
             }
         }
     }
-    if corners.is_empty() { Ok(read) } else { Err("it is cut: its last triangle does not end".to_owned()) }
+    match (corners.is_empty(), is_open) {
+        (false, _) => Err("it is cut: its last triangle does not end".to_owned()),
+        // A file may be cut between two triangles.
+        (true, true) => {
+            let count = read.faces.len();
+            Err(format!(
+                "it is cut: `endsolid` is expected behind its {count} triangles; if none is missing, add that line"
+            ))
+        }
+        (true, false) => Ok(read),
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +135,11 @@ mod tests {
             (binary_of(b"longer", 3, 4), "states 3 triangles"),
             (b"short".to_vec(), "too short for binary STL: 5 bytes"),
             (format!("solid\n{}", &FACET[..FACET.find(" endloop").unwrap()]).into_bytes(), "it is cut"),
+            (format!("solid\n{FACET}").into_bytes(), "`endsolid` is expected behind its 1 triangles"),
+            (
+                format!("solid a\n{FACET}endsolid a\nsolid b\n{FACET}facet nor").into_bytes(),
+                "behind its 2 triangles",
+            ),
             (b"solid\nvertex 0 0 0\nendloop\n".to_vec(), "line 3: a triangle ends, and has 1 corners"),
             (
                 b"solid\nfacet\nvertex 0 0,5 0\n".to_vec(),

@@ -301,8 +301,15 @@ fn what_is_no_mesh_is_refused_with_the_file_and_the_key() {
     refused("box.obj", TURNED, b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n".to_vec(), &["no finite number"]);
     refused("box.stl", TURNED, b"solid nothing".to_vec(), &["box.stl"]);
     refused("box.stl", TURNED, binary_stl()[..300].to_vec(), &["box.stl"]);
-    refused("box.glb", TURNED, b"glTF\x02\0\0\0".to_vec(), &["box.glb"]);
-    refused("box.glb", TURNED, glb("")[..500].to_vec(), &["box.glb"]);
+    let whole = glb("").len();
+    let cut = format!("it is cut: its head states {whole} bytes, and it has 500");
+    refused("box.glb", TURNED, b"glTF\x02\0\0\0".to_vec(), &["box.glb", "it is cut"]);
+    refused("box.glb", TURNED, glb("")[..500].to_vec(), &["box.glb", &cut]);
+    refused("box.glb", TURNED, obj(), &["it is no binary glTF"]);
+    let mut shorts = glb("");
+    let of_corners = shorts.windows(4).position(|bytes| bytes == b"5126").unwrap();
+    shorts[of_corners..][..4].copy_from_slice(b"5122");
+    refused("box.glb", TURNED, shorts, &["its corners are whole numbers"]);
     let flat = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n".to_vec();
     refused("box.obj", &TURNED.replace("triangles", "convex"), flat, &["it is flat or open"]);
     let mut dented = obj();

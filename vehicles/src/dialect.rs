@@ -69,11 +69,21 @@ impl Decimal {
     /// Returns the number in a cell.
     pub fn number(self, cell: &str) -> Option<f64> {
         match self {
-            Self::Point => cell.parse().ok(),
+            Self::Point => parsed(cell),
             Self::Comma if cell.contains('.') => None,
-            Self::Comma => cell.replacen(',', ".", 1).parse().ok(),
+            Self::Comma => parsed(&cell.replacen(',', ".", 1)),
         }
     }
+}
+
+/// The minus sign of Unicode. Programs write it in Swedish, Norwegian, Finnish and other languages.
+const MINUS: char = '\u{2212}';
+
+/// Returns the number in a cell with a decimal point. Its minus signs are hyphens or those of Unicode.
+fn parsed(cell: &str) -> Option<f64> {
+    let number = cell.parse().ok();
+    number
+        .or_else(|| cell.contains(MINUS).then(|| cell.replace(MINUS, "-")).and_then(|cell| cell.parse().ok()))
 }
 
 /// Returns the number in a cell, whichever mark it has.
@@ -83,7 +93,7 @@ pub fn number(cell: &str) -> Option<f64> {
 
 /// True for a number with a comma in it that could also stand between thousands, as `12,345`.
 pub fn is_group(cell: &str) -> bool {
-    let digits = cell.trim_start_matches(['+', '-']);
+    let digits = cell.trim_start_matches(['+', '-', MINUS]);
     digits.split_once(',').is_some_and(|(whole, rest)| {
         let is_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
         (1..=3).contains(&whole.len())
@@ -105,13 +115,16 @@ mod tests {
             ("1,5", None, Some(1.5)),
             ("-0,25e-3", None, Some(-0.25e-3)),
             ("4", Some(4.0), Some(4.0)),
+            ("\u{2212}1.5", Some(-1.5), None),
+            ("\u{2212}2,5e\u{2212}1", None, Some(-0.25)),
+            ("\u{2212}", None, None),
             ("1,234,5", None, None),
             ("1.234,5", None, None),
             ("", None, None),
         ] {
             assert_eq!((Decimal::Point.number(cell), Decimal::Comma.number(cell)), (point, comma), "{cell}");
         }
-        assert!(["1,234", "-12,345", "+123,456"].into_iter().all(is_group));
+        assert!(["1,234", "-12,345", "+123,456", "\u{2212}1,234"].into_iter().all(is_group));
         assert!(!["0,123", "1,23", "1,2345", "1234,567", "1.234", ",123"].into_iter().any(is_group));
     }
 
