@@ -127,7 +127,7 @@ fn with_cells(cell: impl Fn(usize, &str) -> String) -> String {
     format!("{}\n{}", header.replace(',', ";"), rows.lines().enumerate().map(line).collect::<String>())
 }
 
-/// If these cells were left out, the others would be chosen by their values.
+// If these cells were left out, the others would be chosen by their values.
 #[test]
 fn numbers_in_a_form_that_is_not_read_are_refused_and_words_are_not() {
     let in_brackets = |_: usize, cell: &str| {

@@ -56,8 +56,8 @@ impl Triangles {
             return Err(format!("it holds {:?} where triangles are expected", primitive.mode()));
         }
         // The reader takes any corners for floats.
-        let is_float = |corners: gltf::Accessor<'_>| corners.data_type() == DataType::F32;
-        if !primitive.get(&Semantic::Positions).is_none_or(is_float) {
+        let is_whole = |corners: gltf::Accessor<'_>| corners.data_type() != DataType::F32;
+        if primitive.get(&Semantic::Positions).is_some_and(is_whole) {
             return Err(
                 "its corners are whole numbers (KHR_mesh_quantization): export them as floats".to_owned()
             );

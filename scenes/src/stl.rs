@@ -77,12 +77,10 @@ fn text(text: &str) -> Result<Triangles, String> {
     match (corners.is_empty(), is_open) {
         (false, _) => Err("it is cut: its last triangle does not end".to_owned()),
         // A file may be cut between two triangles.
-        (true, true) => {
-            let count = read.faces.len();
-            Err(format!(
-                "it is cut: `endsolid` is expected behind its {count} triangles; if none is missing, add that line"
-            ))
-        }
+        (true, true) => Err(format!(
+            "it is cut: expected `endsolid` behind triangle {}; if no triangle is missing, add that line",
+            read.faces.len()
+        )),
         (true, false) => Ok(read),
     }
 }
@@ -135,10 +133,10 @@ mod tests {
             (binary_of(b"longer", 3, 4), "states 3 triangles"),
             (b"short".to_vec(), "too short for binary STL: 5 bytes"),
             (format!("solid\n{}", &FACET[..FACET.find(" endloop").unwrap()]).into_bytes(), "it is cut"),
-            (format!("solid\n{FACET}").into_bytes(), "`endsolid` is expected behind its 1 triangles"),
+            (format!("solid\n{FACET}").into_bytes(), "expected `endsolid` behind triangle 1"),
             (
                 format!("solid a\n{FACET}endsolid a\nsolid b\n{FACET}facet nor").into_bytes(),
-                "behind its 2 triangles",
+                "expected `endsolid` behind triangle 2",
             ),
             (b"solid\nvertex 0 0 0\nendloop\n".to_vec(), "line 3: a triangle ends, and has 1 corners"),
             (
