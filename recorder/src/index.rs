@@ -33,6 +33,7 @@ use std::ops::Range;
 /// assert_eq!(blocks, 2..4);
 /// assert_eq!(index.messages(&recording, 2).count(), 1000);
 /// assert_eq!(index.before("/pilot/set_point", 2), Some(1));
+/// assert!(index.may_have("/pilot/set_point", 2) && !index.may_have("/imu/sample", 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
@@ -153,9 +154,21 @@ impl Index {
     /// topics of its blocks, that is the one in front of it.
     #[must_use]
     pub fn before(&self, topic: &str, block: usize) -> Option<usize> {
+        self.blocks.get(..block)?.iter().rposition(|block| self.lists(block, topic))
+    }
+
+    /// True if `block` has a message of `topic`, or the file does not list the topics of its blocks.
+    ///
+    /// # Panics
+    /// If there is no such block.
+    #[must_use]
+    pub fn may_have(&self, topic: &str, block: usize) -> bool {
+        self.lists(&self.blocks[block], topic)
+    }
+
+    fn lists(&self, block: &Block, topic: &str) -> bool {
         let is_of_topic = |id: &u16| self.channels.get(id).is_some_and(|(channel, _)| channel.topic == topic);
-        let has = |block: &Block| block.channels.as_ref().is_none_or(|ids| ids.iter().any(is_of_topic));
-        self.blocks.get(..block)?.iter().rposition(has)
+        block.channels.as_ref().is_none_or(|ids| ids.iter().any(is_of_topic))
     }
 
     /// The messages of one block, in the order of the file. A damaged chunk is an error in front of any of its messages; a

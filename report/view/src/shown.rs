@@ -89,6 +89,11 @@ impl Shown {
         self.index.before(topic, block)
     }
 
+    /// True if `block` has a message of one of these topics, or the file does not list the topics of its blocks.
+    pub(crate) fn may_have<'a>(&self, block: usize, mut topics: impl Iterator<Item = &'a str>) -> bool {
+        topics.any(|topic| self.index.may_have(topic, block))
+    }
+
     /// The messages of a block, stamped with times since the first message.
     pub fn messages(&self, block: usize) -> impl Iterator<Item = Result<Record>> + use<'_> {
         let start_ns = self.span_ns[0];

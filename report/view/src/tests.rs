@@ -1,6 +1,7 @@
 //! Answers of the server compared with the messages that were written into a recording.
 
 mod live;
+mod seeks;
 mod vehicles;
 
 use crate::catalogue::{Lasting, catalogue};
