@@ -16,6 +16,12 @@ const GROWTH_MS = 500;
 const GROWING = "The recording is not finished: End goes to its newest second.";
 const UNFINISHED = "The run has ended without finishing its recording: the page shows what was written.";
 const FINISHED_MS = 3000;
+// Time between two drawings of a run without a pace, in which nobody sees single ticks. Where the processor draws, each takes cores from the run.
+const FREE_MS = 50;
+const FREE_BY_PROCESSOR_MS = 200;
+const BY_PROCESSOR_MS = 33;
+// Time between two writings of the vehicles' places.
+const PLACES_MS = 100;
 const HELD = "The run is paused: the room shows its last recorded second.";
 const AWAITED = "Nothing is recorded yet: the recorder writes each second of simulated time.";
 const state = document.getElementById("state");
@@ -63,11 +69,23 @@ function legend(room) {
   });
   document.getElementById("legend").replaceChildren(...lines.map(({ line }) => line));
   document.getElementById("legend").hidden = lines.length === 0;
-  return () => {
+  let [isDue, writtenMs] = [false, -Infinity];
+  const write = () => {
     for (const { body, place } of lines) {
       const { x, y, z } = body.group.position;
-      place.textContent = body.isKnown ? `x ${x.toFixed(2)}  y ${y.toFixed(2)}  z ${z.toFixed(2)} m` : "not there yet";
+      const text = body.isKnown ? `x ${x.toFixed(2)}  y ${y.toFixed(2)}  z ${z.toFixed(2)} m` : "not there yet";
+      if (place.textContent !== text) place.textContent = text;
     }
+  };
+  return {
+    /** The vehicles have moved. */
+    move: () => (isDue = true),
+    /** Writes their places, unless that was a moment ago: a page that lays out text in each frame draws late. */
+    write: (nowMs) => {
+      if (!isDue || nowMs - writtenMs < PLACES_MS) return;
+      [isDue, writtenMs] = [false, nowMs];
+      write();
+    },
   };
 }
 
@@ -158,7 +176,7 @@ async function start() {
   const playback = new Playback(durationNs, recordings[0].tick_ns ?? 1e6);
   const columns = recordings.map((recording) => new Columns(recording));
   const asked = new URLSearchParams(location.search);
-  const options = { flat: asked.has("flat") };
+  const options = { flat: asked.has("flat"), smooth: asked.has("smooth") };
   const room = new Room(document.getElementById("space"), recordings, columns, options);
   label(room, recordings);
   const feeds = recordings.map((recording, number) => new Feed(number, recording, columns[number].fields, reporter(`values ${number}`)));
@@ -180,15 +198,22 @@ async function start() {
   const newest = new Newest(columns[0].fields, () => scopes.feeds[0].fields, reporter("newest"));
   window.hummingbus.newest = newest;
   const isAhead = () => playback.isFollowing && newest.rows !== null;
+  const periodMs = () => {
+    if (run.status.pace === "free") return room.isByProcessor ? FREE_BY_PROCESSOR_MS : FREE_MS;
+    return room.isByProcessor ? BY_PROCESSOR_MS : 0;
+  };
+  let shownNewest = null;
   const show = () => {
+    shownNewest = isAhead() ? newest.rows : null;
     const rows = isAhead() ? [newest.rows.room] : feeds.map((feed) => feed.row(playback));
     if (rows.every(Boolean)) {
-      isStale = playback.isPlaying;
+      // The newest rows are drawn once.
+      isStale = playback.isPlaying && !isAhead();
       shown.timeNs = rows[0].timeNs;
     }
     room.update(rows, isAhead() ? [playback.timeNs] : feeds.map((feed) => Math.min(playback.timeNs, feed.durationNs)));
     scopes.newest = isAhead() ? newest.rows.scopes : null;
-    places();
+    places.move();
     shown.vehicles = room.vehicles.map(({ name, recording, group, isKnown }) => (
       { name, recording, isKnown, position: group.position.toArray(), attitude: group.quaternion.toArray() }));
     scopes.showTime();
@@ -227,10 +252,11 @@ async function start() {
     playback.pass(now - last);
     last = now;
     // The live run has one recording.
-    if (run.status && !run.isOver && playback.isFollowing && recordings.length === 1) newest.ask(({ timeNs }) => playback.reach(timeNs));
+    if (run.status && !run.isOver && playback.isFollowing && recordings.length === 1) newest.ask(({ timeNs }) => playback.reach(timeNs), periodMs());
     else newest.rows = null;
-    if (isStale) show();
+    if (isStale || (isAhead() && newest.rows !== shownNewest)) show();
     else scopes.showLate();
+    places.write(now);
     if (room.draw()) shown.frames += 1;
     shown.scopesDrawn = scopes.isDrawn ?? false;
     requestAnimationFrame(frame);

@@ -16,12 +16,23 @@ const PATH_BLOCKS = 200;
 const PATH_BLOCKS_GROWING = 60;
 // Pause in front of the reading of a path: times that a slider passes are not read.
 const PATH_CALM_MS = 120;
+// Time between two readings while the newest samples are shown: the path goes on with these. Each reading unpacks a minute of the recording.
+const PATH_AGAIN_MS = 5000;
 // Places of a live run behind the end of its recording.
 const TAIL_POINTS = 1200;
 const ABOARD = new THREE.Vector3(0.02, 0, 0.09);
 const AHEAD = new THREE.Vector3(1, 0, 0);
 // The first place of the camera, seen from a vehicle, in multiples of its reach.
 const FIRST_LOOK = new THREE.Vector3(-7, -7, 7);
+
+// Names of programs that draw by the processor, as browsers report them.
+const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|basic render/i;
+
+/** True if the processor draws what `context` draws. */
+function isByProcessor(context) {
+  const names = context.getExtension("WEBGL_debug_renderer_info");
+  return BY_PROCESSOR.test(context.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER));
+}
 
 /** Names of the layers beside the bodies, and if they are shown from the start. */
 export const LAYERS = {
@@ -40,14 +51,15 @@ export const LAYERS = {
 };
 
 export class Room {
-  constructor(canvas, recordings, columns, { flat = false } = {}) {
+  /** `flat` paints on a flat canvas; `smooth` has smooth edges also where the processor draws. */
+  constructor(canvas, recordings, columns, { flat = false, smooth = false } = {}) {
     Object.assign(this, { canvas, recordings, mode: "follow", followed: 0 });
     this.layers = Object.fromEntries(Object.entries(LAYERS).map(([key, [, isOn]]) => [key, isOn]));
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.02, 2000);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(-2, -2, 2);
-    this.#renderer(flat);
+    this.#renderer(flat, smooth);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => (this.isStale = true));
     this.wind = new WindArrow(document.getElementById("wind"));
@@ -65,11 +77,14 @@ export class Room {
     this.#lookAtAll();
   }
 
-  #renderer(flat) {
+  #renderer(flat, smooth) {
     // Another canvas is asked first: one that was asked for WebGL is lost for a flat drawing.
-    this.isFlat = flat || !document.createElement("canvas").getContext("webgl2");
+    const context = document.createElement("canvas").getContext("webgl2");
+    this.isFlat = flat || !context;
+    // Without a graphics card, smooth edges and fine pixels take the cores that a run needs.
+    this.isByProcessor = !smooth && (this.isFlat || isByProcessor(context));
     // A picture of the page is taken between two drawings: without a kept buffer it would be empty.
-    const options = { canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true };
+    const options = { canvas: this.canvas, antialias: !this.isByProcessor, alpha: true, preserveDrawingBuffer: true };
     this.renderer = this.isFlat ? new FlatRenderer(this.canvas) : new THREE.WebGLRenderer(options);
   }
 
@@ -193,10 +208,11 @@ export class Room {
     if (!width || !height) return;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    const ratio = this.isByProcessor ? Math.min(devicePixelRatio, 1) : devicePixelRatio;
     if (this.isFlat) {
-      this.renderer.setSize(width, height, devicePixelRatio);
+      this.renderer.setSize(width, height, ratio);
     } else {
-      this.renderer.setPixelRatio(devicePixelRatio);
+      this.renderer.setPixelRatio(ratio);
       this.renderer.setSize(width, height, false);
     }
     // Another size empties the canvas: it is filled before the browser shows it.
@@ -212,8 +228,12 @@ export class Room {
 
   /** Recordings have grown: their paths are read anew. */
   grow() {
-    // One that is being read is drawn first: of a slow reader there would be none.
-    for (const body of this.vehicles) if (!body.pathRead) body.pathSpan = null;
+    for (const body of this.vehicles) {
+      // One that is being read is drawn first: of a slow reader there would be none. The end of a recording does not wait.
+      if (body.pathRead && this.recordings[body.recording].is_growing) continue;
+      body.pathRead?.abort.abort();
+      Object.assign(body, { pathRead: null, pathSpan: null });
+    }
   }
 
   setMode(mode, followed = this.followed) {
@@ -270,7 +290,7 @@ export class Room {
     body.pathNowNs = timeNs;
     if (!body.position) return;
     const span = body.pathRead?.span ?? body.pathSpan;
-    if (!span || timeNs < span[0] || timeNs > span[1]) this.#readPath(body, timeNs);
+    if (!span || timeNs < span[0] || timeNs > span[1]) this.#readPath(body, isNewest);
     this.#extend(body, isNewest);
     this.#flown(body);
   }
@@ -300,27 +320,37 @@ export class Room {
     geometry.setDrawRange(0, body.tail.length);
   }
 
-  /** Reads the path of a vehicle: all of a short recording, and around the time of a long one. A later reading ends this one. */
-  async #readPath(body, timeNs) {
-    const recording = this.recordings[body.recording];
+  /** The times of a path: all of a short recording, and around the time of a long one. `span` has the times for which it is read. */
+  #pathWindow(recording, timeNs) {
     const most = recording.is_growing ? PATH_BLOCKS_GROWING : PATH_BLOCKS;
     const part = Math.min(most / Math.max(recording.blocks, 1), 1);
     const [endNs, spanNs] = [recording.duration_ns, Math.max(recording.duration_ns * part, 1e9)];
     const fromNs = part === 1 ? 0 : Math.max(Math.round(timeNs - 0.7 * spanNs), 0);
     const span = part === 1 ? [0, Infinity] : [fromNs === 0 ? 0 : timeNs - 0.3 * spanNs, fromNs + spanNs];
     const stepNs = Math.max(Math.ceil(spanNs / PATH_POINTS), 1);
+    return { span, times: { fromNs, stepNs, count: PATH_POINTS, toNs: part === 1 ? Infinity : fromNs + spanNs, endNs } };
+  }
+
+  /** Reads the path of a vehicle, soon. A later reading ends this one. */
+  async #readPath(body, isNewest) {
+    const recording = this.recordings[body.recording];
     body.pathRead?.abort.abort();
-    const read = { span, abort: new AbortController() };
+    const read = { span: this.#pathWindow(recording, body.pathNowNs).span, abort: new AbortController() };
     body.pathRead = read;
-    await new Promise((resolve) => setTimeout(resolve, PATH_CALM_MS));
+    const againMs = isNewest ? (body.pathReadMs ?? -Infinity) + PATH_AGAIN_MS - performance.now() : 0;
+    await new Promise((resolve) => setTimeout(resolve, Math.max(PATH_CALM_MS, againMs)));
     if (body.pathRead !== read) return;
+    body.pathReadMs = performance.now();
+    // The recording may have grown meanwhile.
+    const { span, times } = this.#pathWindow(recording, body.pathNowNs);
+    read.span = span;
     const fields = [...body.position, ...(body.reference ?? [])].map((place) => body.fields[place]);
     try {
-      const request = { recording: body.recording, from_ns: fromNs, step_ns: stepNs, count: PATH_POINTS, fields };
+      const request = { recording: body.recording, from_ns: times.fromNs, step_ns: times.stepNs, count: PATH_POINTS, fields };
       const values = await frames(request, read.abort.signal);
       if (body.pathRead !== read) return;
       this.#drawPath(body, values, fields.length);
-      body.pathTimes = { fromNs, stepNs, count: PATH_POINTS, toNs: part === 1 ? Infinity : fromNs + spanNs, endNs };
+      body.pathTimes = times;
     } catch {
       if (body.pathRead !== read) return;
       body.pathTimes = undefined;

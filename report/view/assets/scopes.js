@@ -166,7 +166,8 @@ class Plot {
     this.hint = Object.assign(document.createElement("div"), { className: "mark-hint", hidden: true });
     this.drawing = new uPlot(options, [[], ...this.curves.map(() => [])], this.area);
     this.now = document.createElement("div");
-    this.now.style.cssText = `position:absolute;top:0;bottom:0;width:1px;pointer-events:none;background:${pageColour("accent")}`;
+    // A layer of its own: it moves with each frame, and the plot below it is not painted anew.
+    this.now.style.cssText = `position:absolute;top:0;bottom:0;left:0;width:1px;pointer-events:none;will-change:transform;background:${pageColour("accent")}`;
     this.drawing.over.append(this.now, this.hint);
     this.drawing.over.addEventListener("dblclick", () => scopes.zoom(null));
     this.#clicks();
@@ -340,8 +341,9 @@ class Plot {
     // A live run is ahead of the curves, which end with its recording.
     const end = this.scopes.newest ? this.scopes.windowS()[1] : Infinity;
     const place = this.drawing.valToPos(Math.min(seconds, end), "x");
-    this.now.style.left = `${place}px`;
-    this.now.hidden = !(place >= 0 && place <= this.drawing.over.clientWidth);
+    this.now.style.transform = `translateX(${place}px)`;
+    // Not the width of the element: asking for it would lay out the page in each frame.
+    this.now.hidden = !(place >= 0 && place <= this.drawing.bbox.width / devicePixelRatio);
   }
 
   showValues(rows, places) {
@@ -360,7 +362,7 @@ export class Scopes {
   #timer = null;
   #running = null;
   #valuesAt = 0;
-  // Some values are on their way.
+  // Some values are on their way, or have come too soon behind others.
   #isLate = false;
   /** Values of the live run ahead of its recording. */
   newest = null;
@@ -568,7 +570,10 @@ export class Scopes {
 
   #showValues() {
     const now = performance.now();
-    if (this.playback.isPlaying && now - this.#valuesAt < VALUES_MS) return;
+    if (this.playback.isPlaying && now - this.#valuesAt < VALUES_MS) {
+      this.#isLate = true;
+      return;
+    }
     const still = { timeNs: this.playback.timeNs, isPlaying: false };
     const rowOf = (feed) => (feed.fields.length > 0 ? feed.row(still)?.values : undefined);
     const rows = this.newest ? [this.newest.values] : this.feeds.map(rowOf);
