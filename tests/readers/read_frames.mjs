@@ -60,6 +60,7 @@ const seen = await withPage(address, async (page, wrong) => {
     drawn: window.hummingbus.shown.frames,
     vehicles: window.hummingbus.shown.vehicles.length,
     isFlat: window.hummingbus.shown.isFlat,
+    isSmooth: window.hummingbus.room.renderer.getContext().getContextAttributes().antialias,
   }));
   return { ...found, drawn: found.drawn - drawn, cpu: ((await busyMs()) - busyBefore) / found.noted.length, wrong };
 }, { before: rate === "slow" ? script(drawSeldom, note) : script(note) });

@@ -4,6 +4,7 @@
 import { withPage } from "./browser.mjs";
 
 const LOOK_MS = 50;
+const REST_MS = 500;
 const [address] = process.argv.slice(2);
 const headers = { "content-type": "application/json" };
 const answered = async (name, options) => (await fetch(new URL(`api/${name}`, address), options)).json();
@@ -38,6 +39,12 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.waitForFunction((wanted) => window.hummingbus.run.status.tick === wanted, { polling: LOOK_MS }, tick + 1);
   await awaitHeld(false);
   found.stepped = await look();
+  // Nothing is new in a paused run: the page rests, and draws no more.
+  await page.waitForFunction((restMs) => new Promise((resolve) => {
+    const { frames } = window.hummingbus.shown;
+    setTimeout(() => resolve(window.hummingbus.shown.frames === frames), restMs);
+  }), { polling: LOOK_MS }, REST_MS);
+  found.isAtRest = await page.evaluate(() => window.hummingbus.newest.rows !== null);
   await steer("stop");
   await page.waitForFunction(() => window.hummingbus.run.status.state === "ended", { polling: LOOK_MS });
   found.wrong = wrong;

@@ -162,6 +162,7 @@ fn the_page_of_a_run_that_was_paused_before_shows_its_newest_tick_after_one_step
     assert!(seen["held"]["timeNs"].as_u64().unwrap() < held * 1_000_000, "{seen}");
     assert_eq!(seen["stepped"]["timeNs"], held * 1_000_000, "{seen}");
     assert_eq!(seen["wentBack"], 0, "time does not go back");
+    assert_eq!(seen["isAtRest"], true, "a page at rest shows the newest samples, and draws them once");
     run.end();
 }
 

@@ -13,6 +13,8 @@ import { defaultPlots, Scopes } from "./scopes.js";
 
 // Pause between two questions for the growth of a recording that is being written.
 const GROWTH_MS = 500;
+// The same for a run without a pace where the processor draws: all plots are drawn anew at each growth.
+const FREE_GROWTH_MS = 2000;
 const GROWING = "The recording is not finished: End goes to its newest second.";
 const UNFINISHED = "The run has ended without finishing its recording: the page shows what was written.";
 const FINISHED_MS = 3000;
@@ -100,8 +102,11 @@ function head(recordings, isLive) {
   list.replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
 }
 
-/** Follows recordings that grow, until their writers have finished them; `grown` hears of each growth, and of new topics. */
-async function follow(recordings, run, report, grown) {
+/**
+ * Follows recordings that grow, until their writers have finished them; `grown` hears of each growth, and of new topics.
+ * `periodMs` is the pause between two questions.
+ */
+async function follow(recordings, run, report, periodMs, grown) {
   const goesOn = () => recordings.some((recording) => recording.is_growing);
   let overMs = null;
   const reportGrowing = () => {
@@ -112,7 +117,7 @@ async function follow(recordings, run, report, grown) {
   };
   if (goesOn()) reportGrowing();
   while (goesOn()) {
-    await new Promise((resolve) => setTimeout(resolve, GROWTH_MS));
+    await new Promise((resolve) => setTimeout(resolve, periodMs()));
     try {
       const { news, isNew } = await newsOf(recordings);
       const hasGrown = isNew || news.some((one, number) => one.duration_ns !== recordings[number].duration_ns || !one.is_growing);
@@ -235,7 +240,9 @@ async function start() {
     head(recordings, run.status !== null);
     isStale = true;
   };
-  follow(recordings, run, reporter("growth"), (isNew) => {
+  const isFree = () => run.status?.state === "running" && run.status.pace === "free";
+  const growthMs = () => (isFree() && room.isByProcessor ? FREE_GROWTH_MS : GROWTH_MS);
+  follow(recordings, run, reporter("growth"), growthMs, (isNew) => {
     if (isNew) learn();
     const isGrowing = recordings.some((recording) => recording.is_growing);
     playback.grow(Math.max(...recordings.map((recording) => recording.duration_ns)), isGrowing);

@@ -9,6 +9,8 @@ const PACES = ["0.1", "0.25", "0.5", "realtime", "2", "5", "10", "free"];
 const STEP_MANY = 100;
 // Simulated time between two missed deadlines of one stretch.
 const STRETCH_S = 1;
+// Time between two writings of the tick of a run that flies: each lays out the page.
+const TICK_MS = 500;
 // States in which a run takes no more requests.
 const OVER = ["ended", "stopping"];
 
@@ -34,6 +36,7 @@ export function hear(heard, report) {
 
 export class RunControls {
   #heardPace = [];
+  #writtenMs = -Infinity;
 
   constructor() {
     /** Marks on the axis of time that no recording has: take-overs, and missed deadlines. */
@@ -67,7 +70,7 @@ export class RunControls {
       this.#choosePace(status.pace);
       for (const hear of this.#heardPace) hear(status.pace);
     }
-    this.#show();
+    this.#show(before);
     if (OVER.includes(status.state)) this.hand.stop("The run has ended.");
     // A node that is starting may not yet say that it can be flown by hand.
     if (this.facts === null && status.state !== "starting") {
@@ -111,7 +114,10 @@ export class RunControls {
     get("run-pace").value = pace;
   }
 
-  #show() {
+  #show(before) {
+    const nowMs = performance.now();
+    if (before?.state === "running" && this.status.state === "running" && nowMs - this.#writtenMs < TICK_MS) return;
+    this.#writtenMs = nowMs;
     const { state, tick, end_tick: endTick, time_s: timeS, missed_deadlines: missed } = this.status;
     const chip = get("run-state");
     if (chip.textContent !== state) {
