@@ -303,7 +303,7 @@ fn the_page_of_ten_vehicles_takes_little_of_the_processor_for_a_frame() {
         (&seen["vehicles"], &seen["isPlaying"], &seen["isFlat"], &seen["wrong"]),
         (&json!(10), &json!(true), &json!(false), &json!([]))
     );
-    assert_eq!(seen["isSmooth"], false, "the processor draws, and smooth edges would cost it most of its time");
+    assert_eq!(seen["isSmooth"], false, "smooth edges take long where the processor draws");
     // Each frame is drawn: the room moves all the time.
     let [frames, drawn] = ["frames", "drawn"].map(|key| seen[key].as_u64().unwrap());
     assert!(frames > 2 && drawn * 10 >= frames * 9, "{seen}");
