@@ -153,7 +153,8 @@ mod tests {
         let mut names: Vec<&str> =
             all.iter().filter(|candidate| acts(candidate)).map(|candidate| candidate.kind.name).collect();
         names.sort_unstable();
-        assert_eq!(names, ["parasitic-drag", "rotor-drag", "thrust-scale", "translational-lift"]);
+        let expected = ["parasitic-drag", "rotor-drag", "rotor-inflow", "thrust-scale", "translational-lift"];
+        assert_eq!(names, expected);
     }
 
     #[test]
