@@ -16,7 +16,7 @@
 //! | [`saved`] | parts of a state as bytes of a fixed number |
 //! | [`snapshot`] | a backend's state as bytes with names |
 //! | [`node`], `memory` | the plant as a process of a run, and its state |
-//! | `arms` | where the rotors are |
+//! | `arms` | where the rotors are, and how wide they can be |
 //! | `airworthy`, `odd`, `beyond` | what a vehicle must be to fly at all; what is odd about it; starts beyond the validated envelope |
 //! | `parameters`, `origin` | what manifests say of a plant, and the flight that starts from it |
 //! | `others` | which vehicles of the traffic are others |
