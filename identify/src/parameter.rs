@@ -9,7 +9,8 @@ use crate::logged_voltage::LoggedVoltage;
 use crate::rotor_speed_filter::SpeedFilter;
 use crate::sensing::SensorErrors;
 use crate::sensor_effects::{
-    ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, ROTOR_SPEED_FILTER, SENSOR_EFFECTS,
+    ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, ROTOR_SPEED_FILTER,
+    SENSOR_EFFECTS,
 };
 use plant::effects::{CATALOGUE, Effect, EffectKind, ParameterSpec, Randomness, Values, WIND};
 use vehicles::Vehicle;
