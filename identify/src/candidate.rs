@@ -128,7 +128,7 @@ pub fn has(prepared: &Prepared, quantity: Quantity) -> bool {
         Quantity::TwoRotations => allows(Equation::Gyroscope),
         Quantity::TwoDirections => has_attitude && has(prepared, Quantity::Force),
         Quantity::InertialUnit => !flight.angular_velocity.is_empty() || !flight.specific_force.is_empty(),
-        Quantity::RotorSpeed | Quantity::SpeedSensor => !flight.rotor_speed.is_empty(),
+        Quantity::RotorSpeed => !flight.rotor_speed.is_empty(),
         Quantity::KnownRig => {
             flight.on_rig == Some(true) || !flight.rotor_speed.is_empty() || may_show_rig(flight)
         }

@@ -28,7 +28,7 @@
 //! | `rig` | flights of vehicles that a rig holds |
 //! | `align`, `fault`, `faults`, `trim` | clocks, sensors and trims, before anything is fitted; a fault and its consequence |
 //! | `clock_words` | clocks in the text of a report |
-//! | `sensing`, `rotor_speed_filter` | the sensors' delays, biases and filters, and a flight without them |
+//! | `sensing` | the sensors' delays and biases, and a flight without them |
 //! | `whiteness`, `noise`, [`statistics`] | what is left, and what noise alone would leave |
 //! | `measured`, `predict`, `forecast`, `horizons` | measured states of a flight; prediction over horizons, and tables of its errors |
 //! | `disturbance`, `limits` | disturbances as they were seen before a window; what predictions are limited by |
@@ -114,7 +114,6 @@ mod revision;
 mod rig;
 pub mod rotor;
 mod rotor_clock;
-mod rotor_speed_filter;
 mod rotor_track;
 mod rows;
 pub mod run;
@@ -153,7 +152,6 @@ pub use prepared::Equation;
 pub use questions::{OpenQuestions, Question};
 pub use ratios::{Ratio, Ratios};
 pub use regressor::Regressor;
-pub use rotor_speed_filter::SpeedFilter;
 pub use sensing::SensorErrors;
 pub use unusable::Unusable;
 
@@ -164,6 +162,6 @@ pub mod steps {
     pub use crate::measured::Measured;
     pub use crate::parameter::{Parameter, Parameters};
     pub use crate::sensor_effects::{
-        ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, ROTOR_SPEED_FILTER, SENSOR_BIAS, SENSOR_DELAY,
+        ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSE_DELAY, SENSOR_BIAS, SENSOR_DELAY,
     };
 }

@@ -4,7 +4,6 @@
 use crate::memo::{Key, Rows};
 use crate::parameter::Parameters;
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Tracks};
-use crate::rotor_speed_filter::SpeedFilter;
 use crate::rotor_track::{EachRotor, Rotors};
 use crate::sensing::SensorErrors;
 use crate::spinning::spun;
@@ -39,26 +38,25 @@ impl Model {
     /// The measured channels of `flight` under these values.
     pub fn tracks(&self, flight: &Prepared, values: &[f64]) -> Arc<Tracks> {
         let errors = SensorErrors::of(&self.parameters, values);
-        flight.tracks(errors.pose_delay_s, errors.inertial_delay_s, errors.rotor_speed)
+        flight.tracks(errors.pose_delay_s, errors.inertial_delay_s)
     }
 
     /// The rotors of `flight` under these values. Where speeds were measured, their difference from the
     /// commanded speeds is smoothed first: the noise of a sensor, differentiated, would pass for spin-up.
     pub fn rotors(&self, flight: &Prepared, values: &[f64]) -> Rotors {
-        let errors = SensorErrors::of(&self.parameters, values);
-        let (pose_s, filter) = (errors.pose_delay_s, errors.rotor_speed);
+        let pose_s = SensorErrors::of(&self.parameters, values).pose_delay_s;
         if flight.flight.command.is_empty() {
             let measured = || {
-                let flown = measured_rotors(flight, (pose_s, filter));
+                let flown = measured_rotors(flight, pose_s);
                 let commanded = flown.iter().map(speeds).collect();
                 Rotors::new(flown, commanded)
             };
-            return Rotors::clone(&flight.recent_rotors.at((pose_s, filter), measured));
+            return Rotors::clone(&flight.recent_rotors.at(pose_s, measured));
         }
         let mut flown = spun(&self.airframe_of(flight, values), flight, pose_s);
         let commanded: Vec<EachRotor> = flown.iter().map(speeds).collect();
         if !flight.flight.rotor_speed.is_empty() {
-            correct(flight, (pose_s, filter), &commanded, &mut flown);
+            correct(flight, pose_s, &commanded, &mut flown);
         }
         Rotors::new(flown, commanded)
     }
@@ -394,13 +392,8 @@ fn speeds(rotors: &PerRotor<RotorState>) -> EachRotor {
 
 /// Adds to rotors that follow from the commands by how much the measured ones turn faster. Their acceleration stays that
 /// of the commands: even of a smoothed measurement it would be noise for the most part.
-fn correct(
-    flight: &Prepared,
-    (pose_s, filter): (f64, SpeedFilter),
-    commanded: &[EachRotor],
-    rotors: &mut [PerRotor<RotorState>],
-) {
-    let mut difference = flight.rotor_speeds(pose_s, filter);
+fn correct(flight: &Prepared, pose_s: f64, commanded: &[EachRotor], rotors: &mut [PerRotor<RotorState>]) {
+    let mut difference = flight.rotor_speeds(pose_s);
     for (difference, commanded) in difference.values.iter_mut().zip(commanded) {
         *difference = std::array::from_fn(|i| difference[i] - commanded[i]);
     }
@@ -412,8 +405,8 @@ fn correct(
     }
 }
 
-fn measured_rotors(flight: &Prepared, (pose_s, filter): (f64, SpeedFilter)) -> Vec<PerRotor<RotorState>> {
-    let track = flight.rotor_speeds(pose_s, filter);
+fn measured_rotors(flight: &Prepared, pose_s: f64) -> Vec<PerRotor<RotorState>> {
+    let track = flight.rotor_speeds(pose_s);
     let slopes = track.slope(BOX_STEPS, flight.layout.clock.step_s);
     let rotor = |speed_rad_s, acceleration_rad_s2| RotorState { speed_rad_s, acceleration_rad_s2 };
     let rotors = track.values.iter().zip(&slopes);

@@ -6,7 +6,6 @@
 
 use crate::flight_wind::FLIGHT_WIND;
 use crate::logged_voltage::LoggedVoltage;
-use crate::rotor_speed_filter::SpeedFilter;
 use crate::sensing::SensorErrors;
 use crate::sensor_effects::{
     ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, ROTOR_SPEED_FILTER,
@@ -258,14 +257,12 @@ impl SensorErrors {
     pub fn of(parameters: &Parameters, values: &[f64]) -> Self {
         let [pose_delay_s, ..] = parameters.values_of(&POSE_DELAY, values);
         let [inertial_delay_s, ..] = parameters.values_of(&IMU_DELAY, values);
-        let [lag_s, late_s, ..] = parameters.values_of(&ROTOR_SPEED_FILTER, values);
         let [a_x, a_y, a_z, ..] = parameters.values_of(&ACCELEROMETER_BIAS, values);
         let [w_x, w_y, w_z, ..] = parameters.values_of(&GYROSCOPE_BIAS, values);
         let [turn_x, turn_y, ..] = parameters.values_of(&ATTITUDE_BIAS, values);
         Self {
             pose_delay_s,
             inertial_delay_s,
-            rotor_speed: SpeedFilter { lag_s, late_s },
             accelerometer_bias_m_s2: [a_x, a_y, a_z],
             gyroscope_bias_rad_s: [w_x, w_y, w_z],
             attitude_bias_rad: [turn_x, turn_y],

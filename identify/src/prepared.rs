@@ -5,7 +5,6 @@ use crate::clock::{Clock, Lateness};
 use crate::measured::Measured;
 use crate::memo::{Memo, Recent};
 use crate::rig;
-use crate::rotor_speed_filter::SpeedFilter;
 use crate::rotor_track::{EachRotor, Rotors};
 use crate::sensing::SensorErrors;
 use crate::track::{Track, valid_about};
@@ -155,10 +154,10 @@ pub struct Prepared<'f> {
     pub slow_period_s: Option<f64>,
     /// Rows that were computed lately.
     pub memo: Memo,
-    /// Tracks, by the delays of pose and inertial unit, the filter of the rotor speeds, and the lateness of the pose.
-    recent_tracks: Recent<(f64, f64, SpeedFilter, Lateness), Tracks>,
-    /// Measured rotors, by the delay of the pose and the filter of their speeds.
-    pub recent_rotors: Recent<(f64, SpeedFilter), Rotors>,
+    /// Tracks, by the delays of pose and inertial unit, and the lateness of the pose.
+    recent_tracks: Recent<(f64, f64, Lateness), Tracks>,
+    /// Measured rotors, by the delay of the pose.
+    pub recent_rotors: Recent<f64, Rotors>,
     /// Measured states for predictions, by the errors of the sensors; `None` where there is nothing to predict with.
     pub recent_measured: Recent<SensorErrors, Option<Measured>>,
     /// Number of the flight among the fit flights that may have a wind of their own.
@@ -337,12 +336,11 @@ impl<'f> Prepared<'f> {
     /// The instants are those of the pose's stamps, so another delay of the pose shifts all channels but the
     /// pose. The noise that interpolation leaves depends on how the samples of a slow and noisy channel lie on
     /// the grid. If the pose were shifted, a fit would move its samples to where that noise is least.
-    pub fn tracks(&self, pose_s: f64, imu_s: f64, filter: SpeedFilter) -> Arc<Tracks> {
-        let sampled = || self.sampled(pose_s, imu_s, filter);
-        self.recent_tracks.at((pose_s, imu_s, filter, self.late), sampled)
+    pub fn tracks(&self, pose_s: f64, imu_s: f64) -> Arc<Tracks> {
+        self.recent_tracks.at((pose_s, imu_s, self.late), || self.sampled(pose_s, imu_s))
     }
 
-    fn sampled(&self, pose_s: f64, imu_s: f64, filter: SpeedFilter) -> Tracks {
+    fn sampled(&self, pose_s: f64, imu_s: f64) -> Tracks {
         let (flight, clock) = (&*self.flight, &self.layout.clock);
         let imu_s = imu_s - pose_s;
         let position = Track::sampled(&flight.position, self.late.position_s, clock);
@@ -357,7 +355,7 @@ impl<'f> Prepared<'f> {
         let gyroscope = Track::sampled(&flight.angular_velocity, imu_s, clock);
         let force = Track::sampled(&flight.specific_force, imu_s, clock);
         let is_of_rotors = self.offset_of(self.rotor_speed()).is_some();
-        let speeds = if is_of_rotors { self.rotor_speeds(pose_s, filter) } else { Track::default() };
+        let speeds = if is_of_rotors { self.rotor_speeds(pose_s) } else { Track::default() };
         let rates = if flight.angular_velocity.is_empty() {
             Track { values: turning.clone(), valid: Vec::new() }.smoothed(BOX_STEPS / 2)
         } else {
@@ -386,10 +384,9 @@ impl<'f> Prepared<'f> {
         Tracks { position, velocity, attitude, rates, rows }
     }
 
-    /// The rotor speeds by the measured ones, with the pose late by `pose_s`, and the `filter` of the speeds taken off.
-    pub fn rotor_speeds(&self, pose_s: f64, filter: SpeedFilter) -> Track<ROTORS_MAX> {
-        let (clock, late_s) = (&self.layout.clock, self.late.rotor_speed_s + filter.late_s - pose_s);
-        filter.taken_off_track(Track::sampled(&self.flight.rotor_speed, late_s, clock), clock.step_s)
+    /// The measured rotor speeds, with the pose late by `pose_s`.
+    pub fn rotor_speeds(&self, pose_s: f64) -> Track<ROTORS_MAX> {
+        Track::sampled(&self.flight.rotor_speed, self.late.rotor_speed_s - pose_s, &self.layout.clock)
     }
 
     /// The acceleration in W by position or velocity alone, seen through the windows: three components for each knot;

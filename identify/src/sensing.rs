@@ -1,11 +1,10 @@
 //! Errors of a flight's sensors, and the flight as sensors without them would have logged it.
 
 use crate::clock::Lateness;
-use crate::rotor_speed_filter::SpeedFilter;
 use flights::{Channel, Flight};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Lateness, biases and filters of sensors.
+/// Lateness and biases of sensors.
 ///
 /// ```
 /// use flights::{Channel, Flight, Role};
@@ -22,8 +21,6 @@ pub struct SensorErrors {
     pub pose_delay_s: f64,
     /// Lateness of gyroscope and accelerometer in s.
     pub inertial_delay_s: f64,
-    /// Filter and lateness of the rotor speeds.
-    pub rotor_speed: SpeedFilter,
     /// Bias of the accelerometer in B, in m/s^2.
     pub accelerometer_bias_m_s2: [f64; 3],
     /// Bias of the gyroscope in B, in rad/s.
@@ -46,7 +43,6 @@ impl SensorErrors {
         earlier(&mut flight.velocity, self.pose_delay_s + late.velocity_s);
         earlier(&mut flight.attitude, self.pose_delay_s + late.attitude_s);
         earlier(&mut flight.rotor_speed, late.rotor_speed_s);
-        self.rotor_speed.taken_off(&mut flight.rotor_speed);
         earlier(&mut flight.angular_velocity, self.inertial_delay_s);
         earlier(&mut flight.specific_force, self.inertial_delay_s);
         less(&mut flight.angular_velocity, self.gyroscope_bias_rad_s);
@@ -76,14 +72,11 @@ impl SensorErrors {
         let negated = Self {
             pose_delay_s: -self.pose_delay_s,
             inertial_delay_s: -self.inertial_delay_s,
-            rotor_speed: SpeedFilter::default(),
             accelerometer_bias_m_s2: self.accelerometer_bias_m_s2.map(|bias| -bias),
             gyroscope_bias_rad_s: self.gyroscope_bias_rad_s.map(|bias| -bias),
             attitude_bias_rad: self.attitude_bias_rad.map(|turn| -turn),
         };
-        let mut flight = negated.taken_off(flight, &Lateness::default());
-        self.rotor_speed.put_on(&mut flight.rotor_speed);
-        flight
+        negated.taken_off(flight, &Lateness::default())
     }
 }
 

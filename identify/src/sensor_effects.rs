@@ -10,8 +10,8 @@ pub const SENSOR_DELAY: &str = "sensor-delay";
 pub const SENSOR_BIAS: &str = "sensor-bias";
 
 /// Effects of sensors, each a part that makes sense alone; several share a name.
-pub static SENSOR_EFFECTS: [&EffectKind; 6] =
-    [&POSE_DELAY, &IMU_DELAY, &ROTOR_SPEED_FILTER, &ACCELEROMETER_BIAS, &GYROSCOPE_BIAS, &ATTITUDE_BIAS];
+pub static SENSOR_EFFECTS: [&EffectKind; 5] =
+    [&POSE_DELAY, &IMU_DELAY, &ACCELEROMETER_BIAS, &GYROSCOPE_BIAS, &ATTITUDE_BIAS];
 
 const DELAY: EffectKind = EffectKind {
     name: SENSOR_DELAY,
@@ -48,22 +48,6 @@ pub static IMU_DELAY: EffectKind = EffectKind {
     needs: &[Quantity::TwoClocks, Quantity::InertialUnit],
     ..DELAY
 };
-/// The rotor speeds are filtered and late. A clock of their own was removed before, by the lateness at which their torques fit best: that of a
-/// filter is about its time constant, so that the guesses have it back.
-pub static ROTOR_SPEED_FILTER: EffectKind = EffectKind {
-    name: "rotor-speed-filter",
-    summary: "logged rotor speeds were filtered or are late",
-    equation: "T y' + y = w, and y is stamped d late",
-    source: "own (a first-order low pass)",
-    validity: "the same filter for all rotors; one of a higher order passes for a lag and a delay",
-    parameters: RotorSpeeds::SPECS,
-    needs: &[Quantity::SpeedSensor],
-    stage: Stage::Sampling,
-    is_delay: true,
-    is_linear: false,
-    guesses: &[&[0.0, 0.02], &[0.01, -0.01], &[0.03, -0.03], &[0.01, 0.0], &[0.03, 0.0]],
-    ..EffectKind::PLAIN
-};
 /// The accelerometer's bias.
 pub static ACCELEROMETER_BIAS: EffectKind =
     EffectKind { parameters: Accelerometer::SPECS, needs: &[Quantity::SpecificForce], ..BIAS };
@@ -85,15 +69,6 @@ effect_parameters! {
     struct ImuDelay {
         /// d of gyroscope and accelerometer
         imu: TIME, min: -0.5, max: 0.5, neutral: Some(0.0), nominal: 0.1, source: "tuned, no source";
-    }
-}
-
-effect_parameters! {
-    struct RotorSpeeds {
-        /// T of the low pass
-        lag: TIME, min: 0.0, max: 0.2, neutral: Some(0.0), nominal: 0.02, source: "tuned, no source";
-        /// d of the rotor speeds
-        late: TIME, min: -0.2, max: 0.2, neutral: Some(0.0), nominal: 0.02, source: "tuned, no source";
     }
 }
 

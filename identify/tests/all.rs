@@ -19,7 +19,6 @@ mod rig;
 mod roles;
 mod rotor;
 mod rotor_flights;
-mod rotor_speed_filter;
 mod statistics;
 mod steps_ahead;
 mod torques_of_the_air;

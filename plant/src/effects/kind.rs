@@ -169,8 +169,6 @@ pub enum Quantity {
     Pose,
     /// The speeds of the rotors.
     RotorSpeed,
-    /// A sensor of the speeds of the rotors.
-    SpeedSensor,
     /// A rig that is declared or that the attitude shows, or else the speeds of the rotors.
     KnownRig,
 }
@@ -271,7 +269,6 @@ impl Quantity {
             Self::RotorSpeed => {
                 "rotor speeds: torques that follow from commands alone are late by unknown times, which passes for a damping"
             }
-            Self::SpeedSensor => "rotor speeds, for their sensor's",
             Self::KnownRig => {
                 "`rig = true` or rotor speeds, where no attitude shows the rig: torques that follow from commands alone are late by \
                  unknown times, which passes for a friction"

@@ -17,7 +17,6 @@ use vehicles::Vehicle;
 use super::blocks::Blocks;
 use super::least_squares::Rows;
 use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, Tracks, box_s};
-use crate::rotor_speed_filter::SpeedFilter;
 use crate::rotor_track::EachRotor;
 use crate::track::Track;
 use crate::unusable::Unusable;
@@ -50,7 +49,7 @@ impl<'f> Equations<'f> {
     /// If too little of its motion can be compared.
     pub fn of(flight: &'f Flight, propulsion: &Propulsion) -> Result<Self, Unusable> {
         let prepared = Prepared::new(flight, box_s(flight), propulsion)?;
-        let tracks = prepared.tracks(0.0, 0.0, SpeedFilter::default());
+        let tracks = prepared.tracks(0.0, 0.0);
         let speeds = Track::sampled(&flight.rotor_speed, 0.0, &prepared.layout.clock).values;
         Ok(Self { flight, prepared, tracks, speeds })
     }
