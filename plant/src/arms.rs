@@ -1,4 +1,4 @@
-//! Arms of a vehicle: where its rotors are, and how wide rotors there can be.
+//! Arms of a vehicle: where its rotors are.
 
 use nalgebra::Vector3;
 use vehicles::{Rotor, Vehicle};
@@ -20,12 +20,4 @@ pub(crate) fn longest_arm(vehicle: &Vehicle) -> usize {
     let longest_m = longest_arm_m(vehicle);
     let is_longest = |rotor: &Rotor| (rotor.position_m - middle_B_m).norm() >= longest_m;
     vehicle.rotors.iter().position(is_longest).unwrap_or_default()
-}
-
-/// The radius of the vehicle's rotors, m: `stated_m` where such rotors fit, else a typical one. A rotor is at most half as wide as the way
-/// to the next one.
-pub(crate) fn rotor_radius_m(vehicle: &Vehicle, stated_m: f64) -> f64 {
-    let [first, second, ..] = &vehicle.rotors[..] else { return stated_m };
-    let apart_m = (first.position_m - second.position_m).norm();
-    if (0.3..0.5).contains(&(stated_m / apart_m)) { stated_m } else { 0.35 * apart_m }
 }

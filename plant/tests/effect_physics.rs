@@ -2,7 +2,7 @@
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in, N the newton")]
 
 use crate::common;
-use common::{TICK_S, crazyflie, free_body, hummingbird};
+use common::{TICK_S, free_body, hummingbird};
 use nalgebra::{UnitQuaternion, Vector3};
 use plant::effects::{Effect, find};
 use plant::{Accelerations, Airframe, AirframeState, NewtonEuler, RigidBody, State};
@@ -94,127 +94,6 @@ fn climbing_costs_thrust_and_flying_sideways_gains_some() {
     let (weight_N, speed_rad_s) = (0.480 * 9.81, hummingbird().hover_speed_rad_s());
     assert!((lift_N(Vector3::z()) - (weight_N - 4.0 * 2e-4 * speed_rad_s)).abs() < 1e-9);
     assert!((lift_N(Vector3::new(3.0, 0.0, 0.0)) - (weight_N + 4.0 * 3e-3 * 9.0)).abs() < 1e-9);
-}
-
-/// The Hummingbird in hover with `rotor-inflow`.
-struct Inflow {
-    /// Thrust of all rotors per velocity of the air through them.
-    per_speed: f64,
-    /// Induced velocity.
-    induced_m_s: f64,
-}
-
-/// Its coefficient and radius.
-const INFLOW: [f64; 2] = [4e-4, 0.1];
-
-impl Inflow {
-    fn in_hover() -> Self {
-        let [coefficient, radius_m] = INFLOW;
-        let (disc_m2, thrust_N) = (std::f64::consts::PI * radius_m * radius_m, 0.480 * 9.81 / 4.0);
-        let induced_m_s = (thrust_N / (2.0 * 1.225 * disc_m2)).sqrt();
-        Self { per_speed: 4.0 * coefficient * hummingbird().hover_speed_rad_s(), induced_m_s }
-    }
-
-    /// The change of thrust at a velocity through still air.
-    fn gain_N(&self, velocity_W_m_s: Vector3<f64>) -> f64 {
-        let mut flight = Flight::hovering(vec![effect("rotor-inflow", &INFLOW)]);
-        flight.state.body.velocity_W_m_s = velocity_W_m_s;
-        let motion = flight.accelerations();
-        assert!(motion.specific_force_B_m_s2.xy().norm() < 1e-12, "along the axes alone: {motion:?}");
-        assert!(motion.angular_acceleration_B_rad_s2.norm() < 1e-9, "all rotors alike: {motion:?}");
-        (motion.specific_force_B_m_s2.z - 9.81) * 0.480
-    }
-
-    /// The induced velocity in a climb, by the closed form of momentum theory.
-    fn climbing_m_s(&self, climb_m_s: f64) -> f64 {
-        -climb_m_s / 2.0 + (climb_m_s * climb_m_s / 4.0 + self.induced_m_s * self.induced_m_s).sqrt()
-    }
-}
-
-#[test]
-fn a_climb_costs_thrust_by_the_closed_form_of_momentum_theory_and_a_descent_gains_some() {
-    let hover = Inflow::in_hover();
-    assert!(hover.gain_N(Vector3::zeros()).abs() < 1e-9, "nothing changes in hover");
-    for climb_m_s in [-1.4 * hover.induced_m_s, -2.0, -0.1, 0.1, 3.0, 30.0] {
-        let gain_N = hover.gain_N(Vector3::z() * climb_m_s);
-        let inflow_m_s = hover.climbing_m_s(climb_m_s) + climb_m_s;
-        let expected_N = hover.per_speed * (hover.induced_m_s - inflow_m_s);
-        assert!((gain_N - expected_N).abs() < 1e-9, "{climb_m_s} m/s: {gain_N} N, {expected_N} N");
-        assert!(gain_N * climb_m_s < 0.0, "{climb_m_s} m/s: {gain_N} N");
-    }
-}
-
-#[test]
-fn level_flight_gains_thrust_up_to_that_without_induced_velocity() {
-    let hover = Inflow::in_hover();
-    for speed_m_s in [0.1, 2.0, 5.0, 15.0, 100.0] {
-        let (squared, fourth) = (speed_m_s * speed_m_s, hover.induced_m_s.powi(4));
-        // n^2 = -V^2 / 2 + sqrt(V^4 / 4 + u^4), as a quotient without a difference of near numbers.
-        let induced_m_s = (fourth / (squared / 2.0 + (squared * squared / 4.0 + fourth).sqrt())).sqrt();
-        let expected_N = hover.per_speed * (hover.induced_m_s - induced_m_s);
-        for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-            let gain_N = hover.gain_N(Vector3::new(x, y, 0.0) * speed_m_s);
-            assert!((gain_N - expected_N).abs() < 1e-9, "{speed_m_s} m/s: {gain_N} N, {expected_N} N");
-        }
-        assert!(0.0 < expected_N && expected_N < hover.per_speed * hover.induced_m_s);
-    }
-}
-
-#[test]
-fn oblique_flight_fulfils_the_equation_of_momentum_theory() {
-    let hover = Inflow::in_hover();
-    for velocity in [[3.0, -4.0, 2.0], [1.0, 0.0, -3.0], [0.0, 8.0, -5.0], [20.0, 5.0, 9.0]] {
-        let [x, y, climb_m_s] = velocity;
-        let inflow_m_s = hover.induced_m_s - hover.gain_N(velocity.into()) / hover.per_speed;
-        let (induced_m_s, squared) = (inflow_m_s - climb_m_s, x * x + y * y + inflow_m_s * inflow_m_s);
-        let of_hover = hover.induced_m_s * hover.induced_m_s;
-        assert!(induced_m_s > 0.0 && (induced_m_s * squared.sqrt() - of_hover).abs() < 1e-8, "{velocity:?}");
-    }
-}
-
-/// The expansion about hover is that effect: k_z = b / 2, and k_h = b w / (4 u).
-#[test]
-fn slow_flight_changes_thrust_as_translational_lift_does() {
-    let hover = Inflow::in_hover();
-    let slow_m_s = 0.01;
-    let climbing = hover.gain_N(Vector3::z() * slow_m_s) / (hover.per_speed * slow_m_s);
-    let level = hover.gain_N(Vector3::x() * slow_m_s) / (hover.per_speed * slow_m_s * slow_m_s);
-    assert!((climbing + 0.5).abs() < 1e-3, "{climbing}");
-    assert!((level * 4.0 * hover.induced_m_s - 1.0).abs() < 1e-3, "{level}");
-}
-
-#[test]
-fn in_a_fast_descent_the_induced_velocity_grows_no_more() {
-    let hover = Inflow::in_hover();
-    let gain_N = |of_induced: f64| hover.gain_N(Vector3::z() * (of_induced * hover.induced_m_s));
-    let apart_N = gain_N(-3.0) - gain_N(-1.5);
-    assert!((apart_N - hover.per_speed * 1.5 * hover.induced_m_s).abs() < 1e-9, "{apart_N}");
-}
-
-/// Roll lifts the left hub and lowers the right one, by 0.17 m times the rate.
-#[test]
-fn a_roll_is_damped_by_the_inflow_at_the_hubs() {
-    let hover = Inflow::in_hover();
-    let mut flight = Flight::hovering(vec![effect("rotor-inflow", &INFLOW)]);
-    flight.state.body.angular_velocity_B_rad_s.x = 2.0;
-    let climb_m_s = 2.0 * 0.17;
-    let [left_m_s, right_m_s] = [climb_m_s, -climb_m_s].map(|climb| hover.climbing_m_s(climb) + climb);
-    let torque_N_m = 0.17 * hover.per_speed / 4.0 * (right_m_s - left_m_s);
-    let turning = flight.accelerations().angular_acceleration_B_rad_s2;
-    assert!(torque_N_m < 0.0 && (turning.x - torque_N_m / 5.6e-3).abs() < 1e-9, "{turning}");
-}
-
-#[test]
-fn rotors_of_a_typical_radius_fit_between_each_other() {
-    for name in ["rotor-inflow", "ground-effect"] {
-        let kind = find(name).unwrap();
-        let stated_m = kind.neutral_for(&hummingbird()).values[1];
-        assert_eq!(stated_m, 0.1016, "{name}: that of the Hummingbird fits");
-        let small = crazyflie();
-        let apart_m = (small.rotors[0].position_m - small.rotors[1].position_m).norm();
-        let radius_m = kind.neutral_for(&small).values[1];
-        assert!((radius_m / apart_m - 0.35).abs() < 1e-12, "{name}: {radius_m} m");
-    }
 }
 
 #[test]

@@ -18,7 +18,6 @@ const NAMES: &[&str] = &[
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
-    "rotor-inflow",
     "blade-flapping",
     "velocity-torque",
     "rate-damping",
@@ -43,11 +42,10 @@ const NAMES: &[&str] = &[
 ];
 
 /// Those that know neither where up is nor where the ground is, so that the laboratory may be turned at will.
-const FREE_OF_THE_VERTICAL: [&str; 10] = [
+const FREE_OF_THE_VERTICAL: [&str; 9] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
-    "rotor-inflow",
     "blade-flapping",
     "velocity-torque",
     "rate-damping",

@@ -19,7 +19,7 @@ pub const FREE_DELAY_S: f64 = 0.02;
 
 /// Names of the effects that are candidates without rotor speeds; the others are in `torques_of_the_air`, and the drag torque of the rotors
 /// is in `yaw_gain`.
-pub const EFFECTS: [&str; 21] = [
+pub const EFFECTS: [&str; 20] = [
     "rotor-drag",
     "parasitic-drag",
     "translational-lift",
@@ -40,7 +40,6 @@ pub const EFFECTS: [&str; 21] = [
     SENSOR_DELAY,
     SENSOR_BIAS,
     "gimbal-friction",
-    "rotor-inflow",
 ];
 
 /// Effects of a rig.

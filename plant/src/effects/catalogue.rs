@@ -19,7 +19,6 @@ mod parasitic_drag;
 mod rate_damping;
 mod rig_pendulum;
 mod rotor_drag;
-mod rotor_inflow;
 mod thrust_scale;
 mod torque_scale;
 mod translational_lift;
@@ -33,7 +32,6 @@ pub static CATALOGUE: &[&EffectKind] = &[
     &rotor_drag::EFFECT,
     &parasitic_drag::EFFECT,
     &translational_lift::EFFECT,
-    &rotor_inflow::EFFECT,
     &blade_flapping::EFFECT,
     &velocity_torque::EFFECT,
     &rate_damping::EFFECT,

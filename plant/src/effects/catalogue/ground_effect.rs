@@ -1,7 +1,6 @@
 //! More thrust near the ground.
 
 use super::{mass_error, thrust_scale};
-use crate::arms::rotor_radius_m;
 use crate::effects::condition::FlightCondition;
 use crate::effects::kind::{Action, Confounder, EffectKind, Quantity, Values};
 use diagnostics::unit::{LENGTH, RATIO};
@@ -46,8 +45,13 @@ fn gain_N(values: &Values, condition: &FlightCondition, rotor: usize) -> f64 {
     condition.thrust_N(rotor) * (1.0 / (1.0 - strength * ratio * ratio) - 1.0)
 }
 
+/// A rotor is at most half as wide as the way to the next one.
 fn scale_to(vehicle: &Vehicle, values: &mut Values) {
     let mut parameters = Parameters::from(&*values);
-    parameters.rotor_radius = rotor_radius_m(vehicle, parameters.rotor_radius);
+    let [first, second, ..] = &vehicle.rotors[..] else { return };
+    let apart_m = (first.position_m - second.position_m).norm();
+    if !(0.3..0.5).contains(&(parameters.rotor_radius / apart_m)) {
+        parameters.rotor_radius = 0.35 * apart_m;
+    }
     *values = parameters.into();
 }
