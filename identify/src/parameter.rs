@@ -8,8 +8,7 @@ use crate::flight_wind::FLIGHT_WIND;
 use crate::logged_voltage::LoggedVoltage;
 use crate::sensing::SensorErrors;
 use crate::sensor_effects::{
-    ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, ROTOR_SPEED_FILTER,
-    SENSOR_EFFECTS,
+    ACCELEROMETER_BIAS, ATTITUDE_BIAS, GYROSCOPE_BIAS, IMU_DELAY, POSE_DELAY, SENSOR_EFFECTS,
 };
 use plant::effects::{CATALOGUE, Effect, EffectKind, ParameterSpec, Randomness, Values, WIND};
 use vehicles::Vehicle;

@@ -384,11 +384,6 @@ fn what_does_not_fit_is_said_by_check_with_its_key() {
         ),
         ("", mapped("\"state.stamp.sec\"", "\"state\""), "is `state`; a field is `PORT.FIELD`"),
         ("", mapped("seconds =", "steps ="), "`parameters.inputs.steps` is no input of the FMU"),
-        (
-            "",
-            mapped("seconds = \"state.stamp.sec\"", "seconds = \"state.position.z\""),
-            "is not a signed 32-bit integer",
-        ),
         ("", mapped("passed =", "label ="), "`parameters.outputs.label` is a string"),
         (
             "",
@@ -440,6 +435,15 @@ fn what_does_not_fit_is_said_by_check_with_its_key() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// Only a flight has values.
+#[test]
+fn a_value_that_is_no_integer_ends_the_flight_with_its_variable() {
+    let place = Place::new();
+    let parameters = MAPPED.replace("seconds = \"state.stamp.sec\"", "seconds = \"state.position.z\"");
+    let ended = place.call(&["run", &beside(&place, &native(&place), "", &parameters)]);
+    assert!(ended.code == Some(2) && ended.error.contains("is not a signed 32-bit integer"), "{ended}");
 }
 
 #[test]

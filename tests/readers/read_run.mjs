@@ -42,7 +42,8 @@ const seen = await withPage(address, async (page, wrong) => {
   await page.waitForFunction(() => {
     const rows = [...document.querySelectorAll("#schedule-rows tr")];
     const isMeasured = (name) => rows.some((row) => row.cells[0].textContent === name && row.cells[7].textContent !== "–");
-    return ["plant", "imu", "ekf", "controller"].every(isMeasured);
+    const lefts = new Set([...document.querySelectorAll("#schedule-rows .bar")].map((bar) => bar.getBoundingClientRect().left));
+    return lefts.size > 1 && ["plant", "imu", "ekf", "controller"].every(isMeasured);
   });
   found.schedule = await page.evaluate(() => ({
     rows: [...document.querySelectorAll("#schedule-rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)),

@@ -120,7 +120,7 @@ fn require_short_seeks(entry: &Entry, whole: u64) {
     }
 }
 
-/// What a playing page and a zoomed plot request: 20 s.
+/// Length of what a playing page and a zoomed plot request: 20 s.
 fn require_short_windows(entry: &Entry, whole: u64) {
     let (shown, fields) = (&entry.known().shown, asked(&[("/plant/state", "position.x")]));
     let from_ns = 1800 * SECOND_NS;
