@@ -1,6 +1,7 @@
 //! No two files of a crate need each other: what a file names lies in files below it, all the way down. And no public
 //! function of the library has an error of another project in its signature. The launcher knows no crate of vehicles or scenes.
 //! Components know no transport, and hide nothing that changes from their states. The library needs no terminal and no plots.
+//! A room of the crate `identify` needs those below it alone.
 //!
 //! A file needs another where it names something that the other defines, whatever path or re-export it takes; a
 //! module that is declared or re-exported is not yet needed. Tests may look at everything, and are left out.
@@ -436,6 +437,66 @@ fn no_files_need_each_other() {
         }
     }
     assert!(found.is_empty(), "move types down, to where all who need them look:\n{found}");
+}
+
+/// Rooms of the crate `identify`, each with those that its files may need.
+const ROOMS_OF_IDENTIFY: [(&str, &[&str]); 6] = [
+    ("numbers", &[]),
+    ("data", &["numbers"]),
+    ("model", &["numbers", "data"]),
+    ("search", &["numbers", "data", "model"]),
+    ("report", &["numbers", "data", "model", "search"]),
+    ("rotor", &["numbers", "data", "model"]),
+];
+
+/// Files of it that lead through all rooms.
+const ABOVE_THE_ROOMS: [&str; 3] = ["lib", "run", "error"];
+
+/// A flight is data, a model is held against it, a search finds effects, and a report says which.
+#[test]
+fn rooms_of_identify_need_those_below_alone() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("identify/src");
+    let found = upward_needs(&folder);
+    assert!(found.is_empty(), "move it down, or what it needs:\n{}", found.join("\n"));
+}
+
+/// Files of the rooms in `folder` that need one of another room than they may, and those that are in no room.
+fn upward_needs(folder: &Path) -> Vec<String> {
+    let room = |file: &Path| {
+        let first = file.strip_prefix(folder).unwrap().iter().next().unwrap();
+        Path::new(first).file_stem().unwrap().to_str().unwrap().to_owned()
+    };
+    let short = |file: &Path| file.strip_prefix(folder).unwrap().display().to_string();
+    let read = Crate::read(&folder.join("lib.rs"));
+    let mut found = Vec::new();
+    for (file, needed) in read.needs() {
+        let of = room(file);
+        if ABOVE_THE_ROOMS.contains(&of.as_str()) {
+            continue;
+        }
+        let Some((_, may)) = ROOMS_OF_IDENTIFY.iter().find(|(name, _)| *name == of) else {
+            found.push(format!("{} is in no room", short(file)));
+            continue;
+        };
+        let is_upward = |other: &&Path| room(other) != of && !may.contains(&room(other).as_str());
+        let upward = needed.into_iter().filter(is_upward);
+        found.extend(upward.map(|other| format!("{} needs {}", short(file), short(other))));
+    }
+    found
+}
+
+#[test]
+fn a_room_that_needs_one_above_is_found() {
+    let files = [
+        ("lib.rs", "mod data; mod model; mod stray; pub mod run;"),
+        ("data.rs", "pub mod low; pub struct Flight;"),
+        ("data/low.rs", "use crate::model::Model; pub fn low(_: Model) {}"),
+        ("model.rs", "use crate::data::Flight; pub struct Model(Flight);"),
+        ("stray.rs", ""),
+        ("run.rs", "use crate::model::Model; pub fn run(_: Model) {}"),
+    ];
+    let folder = folder_of(&files);
+    assert_eq!(upward_needs(folder.path()), ["data/low.rs needs model.rs", "stray.rs is in no room"]);
 }
 
 /// Crates that know what flies, and where.

@@ -1,6 +1,6 @@
 //! Reasons why flights cannot be used for identification.
 
-use crate::fault::Fault;
+use crate::data::fault::Fault;
 use diagnostics::Diagnostic;
 use flights::{Flight, FlightSet, Role};
 

@@ -1,40 +1,42 @@
 //! The whole way: from flights and the declared vehicle to a report.
 
-use crate::align::{Offsets, align};
-use crate::at_limit::at_limits;
-use crate::candidate::{Candidate, candidates};
-use crate::clock::Lateness;
-use crate::confounded::rivals;
-use crate::effect_reports;
-use crate::envelope;
+use crate::data::clock::Lateness;
+use crate::data::fault::Fault;
+use crate::data::logged_voltage::LoggedVoltage;
+use crate::data::parts;
+use crate::data::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
+use crate::data::rig;
+use crate::data::rows::column;
+use crate::data::sensing::SensorErrors;
 use crate::error::{faulty, no_flight};
-use crate::excerpt::{self, excerpt, on_all};
-use crate::fault::Fault;
-use crate::faults;
-use crate::fit::Problem;
-use crate::horizons::{of_role, predictions};
-use crate::limits::limits;
-use crate::logged_voltage::LoggedVoltage;
-use crate::logging;
-use crate::loss::losses;
-use crate::misfit::misfits;
-use crate::model::Model;
-use crate::noise;
-use crate::parameter::Parameters;
-use crate::parts;
-use crate::prepared::{BOX_STEPS, Equation, Layout, Prepared, Propulsion, block_s, box_s};
-use crate::questions::OpenQuestions;
-use crate::ratios::Ratios;
-use crate::regressor::{Regressor, regressors};
-use crate::report::{BeforeAfter, Changes, EffectReport, FlightReport, FlightWind, Report, Unexplained};
-use crate::rig;
-use crate::rows::column;
-use crate::select::{Selection, select};
-use crate::sensing::SensorErrors;
-use crate::trim;
-use crate::whiteness::{Whiteness, whiteness};
-use crate::whitening::Noises;
-use crate::wind_reports;
+use crate::model::noise;
+use crate::model::parameter::Parameters;
+use crate::model::physics::Model;
+use crate::model::problem::Problem;
+use crate::model::whitening::Noises;
+use crate::report::effect_reports;
+use crate::report::envelope;
+use crate::report::horizons::{of_role, predictions};
+use crate::report::limits::limits;
+use crate::report::loss::losses;
+use crate::report::misfit::misfits;
+use crate::report::regressor::{Regressor, regressors};
+use crate::report::results::{
+    BeforeAfter, Changes, EffectReport, FlightReport, FlightWind, Report, Unexplained,
+};
+use crate::report::trim;
+use crate::report::whiteness::{Whiteness, whiteness};
+use crate::report::wind_reports;
+use crate::search::align::{Offsets, align};
+use crate::search::at_limit::at_limits;
+use crate::search::candidate::{Candidate, candidates};
+use crate::search::confounded::rivals;
+use crate::search::excerpt::{self, excerpt, on_all};
+use crate::search::faults;
+use crate::search::logging;
+use crate::search::questions::OpenQuestions;
+use crate::search::ratios::Ratios;
+use crate::search::select::{Selection, select};
 use flights::{Flight, FlightSet, Role};
 use plant::effects::{Effect, entry};
 use std::collections::BTreeMap;
@@ -42,7 +44,7 @@ use vehicles::Vehicle;
 use vehicles::bearing::Bearing;
 
 pub use crate::error::IdentifyError;
-pub use crate::horizons::HORIZONS_S;
+pub use crate::report::horizons::HORIZONS_S;
 
 /// A residual is worth telling where its persistent part is beyond this part of its noise.
 const UNEXPLAINED: f64 = 0.3;

@@ -1,8 +1,8 @@
 //! Flights for unit tests: a Hummingbird whose rotors turn at hover, and that moves as the test says; and simulated ones.
 
 #![allow(non_snake_case, reason = "a trailing _W or _B names the frame a vector is written in")]
-use crate::candidate::Candidate;
-use crate::fit::Problem;
+use crate::model::problem::Problem;
+use crate::search::candidate::Candidate;
 use crate::simulated::{Plan, fly, vehicle_file};
 use flights::{Channel, Flight, FlightSet, Role};
 use nalgebra::UnitQuaternion;

@@ -8,7 +8,7 @@ use super::dynamics::{Dynamics, Order};
 use super::flown::{Figure, Flown, FlownMotor};
 use super::stand::Stand;
 use super::statics::Statics;
-use crate::statistics::Estimate;
+use crate::numbers::statistics::Estimate;
 
 /// A value that a stand and flights both determine.
 #[derive(Debug, Clone, Serialize)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::score::{LEVEL, Score};
-use crate::statistics::{Estimate, jackknife};
+use crate::numbers::statistics::{Estimate, jackknife};
 
 /// Plateaus that a fit needs.
 pub const PLATEAUS_MIN: usize = 4;

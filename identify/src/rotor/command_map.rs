@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::coefficient::{jackknifed, line};
 use super::score::Score;
 use super::step::Hold;
-use crate::statistics::Estimate;
+use crate::numbers::statistics::Estimate;
 
 /// Holds that a line needs.
 const HOLDS_MIN: usize = 3;

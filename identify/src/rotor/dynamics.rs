@@ -10,7 +10,7 @@ use super::response::Lag;
 use super::score::{LEVEL, Score};
 use super::stand::{Clock, Stand};
 use super::step::{Cut, Hold, Step};
-use crate::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife, mean};
+use crate::numbers::statistics::{Bootstrap, Estimate, MeanInterval, block_bootstrap_mean, jackknife, mean};
 
 pub use super::lag::Order;
 

@@ -5,8 +5,8 @@ use std::fmt;
 use super::agreement::Agreement;
 use super::dynamics::Order;
 use super::flown::{Figure, Flown, FlownCoefficient, FlownCoefficients, FlownMotor, HeldOut, LagFigures};
-use crate::digits::rounded;
-use crate::statistics::Estimate;
+use crate::numbers::digits::rounded;
+use crate::numbers::statistics::Estimate;
 use diagnostics::unit::behind_number;
 
 /// Writes what flights show.

@@ -13,7 +13,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::response::Lag;
 use super::stand::Clock;
 use super::step::Step;
-use crate::statistics::mean;
+use crate::numbers::statistics::mean;
 
 /// Iterations at most; a dozen are usual.
 const ITERATIONS_MAX: usize = 60;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::statistics::{autocorrelation, white_noise_bound};
+use crate::numbers::statistics::{autocorrelation, white_noise_bound};
 
 /// A reading of a plateau is an outlier beyond this many robust standard deviations.
 const OUTLIER_SIGMAS: f64 = 6.0;

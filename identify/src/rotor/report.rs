@@ -13,7 +13,7 @@ use super::flown_report;
 use super::plateau;
 use super::score::Score;
 use super::statics::Statics;
-use crate::statistics::Estimate;
+use crate::numbers::statistics::Estimate;
 
 /// Everything that a stand and flights told.
 #[derive(Debug, Clone, Serialize)]

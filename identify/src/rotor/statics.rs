@@ -11,7 +11,7 @@ use super::error::RotorError;
 use super::plateau::{self, Plateaus, REST_RAD_S, median, median_error, without_outliers};
 use super::stand::{Column, Stand, StaticLog, held_out, short_name};
 use super::table::LogTable;
-use crate::statistics::mean;
+use crate::numbers::statistics::mean;
 
 /// Density of air for checks of plausibility, in kg/m^3 (15 degrees C at sea level, ISO 2533).
 pub const AIR_KG_M3: f64 = 1.225;

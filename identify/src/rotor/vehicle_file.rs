@@ -9,8 +9,8 @@ use super::flown::{Figure, FlownCoefficient, FlownCoefficients, FlownMotor};
 use super::report::RotorReport;
 use super::stand::VehicleFile;
 use super::statics::Statics;
-use crate::digits::{quantity, rounded, to_six_digits};
-use crate::statistics::Estimate;
+use crate::numbers::digits::{quantity, rounded, to_six_digits};
+use crate::numbers::statistics::Estimate;
 
 /// The text of `rotor.toml`. Values that the stand does not give come from `vehicle`, and are left out without one.
 pub fn text(report: &RotorReport, vehicle: Option<&VehicleFile>) -> String {

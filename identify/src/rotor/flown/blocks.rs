@@ -1,6 +1,6 @@
 //! Blocks of time that count as independent units, numbered over all flights.
 
-use crate::prepared::block_s;
+use crate::data::prepared::block_s;
 
 /// The blocks of some flights.
 #[derive(Debug, Clone)]

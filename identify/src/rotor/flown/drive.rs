@@ -13,11 +13,11 @@ use super::motor::{
     self, A1, A2, DELAY, DELAY_MAX_S, Fit, Form, HIGH, LAG_MAX_S, LOW, POWER, POWERS, Values,
 };
 use super::voltage::{self, Voltage};
-use crate::normal;
+use crate::numbers::normal;
+use crate::numbers::statistics::{Bootstrap, Estimate, block_bootstrap_mean};
 use crate::rotor::dynamics::{Comparison, Order};
 use crate::rotor::plateau::median;
 use crate::rotor::score::LEVEL;
-use crate::statistics::{Bootstrap, Estimate, block_bootstrap_mean};
 
 /// Part of the commands that is left out at both ends of the range that was flown.
 const RARE: f64 = 0.005;

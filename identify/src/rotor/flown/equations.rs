@@ -16,11 +16,11 @@ use vehicles::Vehicle;
 
 use super::blocks::Blocks;
 use super::least_squares::Rows;
-use crate::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, Tracks, box_s};
-use crate::rotor_track::EachRotor;
-use crate::track::Track;
-use crate::unusable::Unusable;
-use crate::window::{SIMPSON, Window, central_difference};
+use crate::data::prepared::{BOX_STEPS, Equation, Prepared, Propulsion, Tracks, box_s};
+use crate::data::rotor_track::EachRotor;
+use crate::data::track::Track;
+use crate::data::unusable::Unusable;
+use crate::data::window::{SIMPSON, Window, central_difference};
 
 /// Component of the specific force along z.
 pub const FORCE_Z: usize = 0;
@@ -275,7 +275,10 @@ impl<'f> Equations<'f> {
     }
 
     fn stretches(&self) -> Vec<Range<usize>> {
-        crate::whitening::stretches(&self.prepared).into_iter().map(|(first, end)| first..end).collect()
+        crate::model::whitening::stretches(&self.prepared)
+            .into_iter()
+            .map(|(first, end)| first..end)
+            .collect()
     }
 }
 

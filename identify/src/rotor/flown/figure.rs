@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::digits::{quantity, rounded};
-use crate::statistics::Estimate;
+use crate::numbers::digits::{quantity, rounded};
+use crate::numbers::statistics::Estimate;
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -11,10 +11,10 @@ use super::equations::{ACCELERATION, AIR_TERMS, Equations, FORCE_Z, working};
 use super::figure::{Figure, HeldOut, rms};
 use super::least_squares::{self, Prior, Rows, Solution, Weighting};
 use super::speed_noise::{self, Corrected};
-use crate::prepared::Propulsion;
+use crate::data::prepared::Propulsion;
+use crate::numbers::statistics::{Estimate, mean};
 use crate::rotor::score::LEVEL;
 use crate::rotor::statics::AIR_KG_M3;
-use crate::statistics::{Estimate, mean};
 
 /// Bias of an accelerometer along one axis, in m/s^2: 20 mg, the typical zero-g offset of a BMI088 (Bosch Sensortec,
 /// BST-BMI088-DS001, table 2).

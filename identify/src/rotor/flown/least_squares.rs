@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use crate::noise_model::{NoiseModel, Products};
-use crate::normal::{self, Block};
+use crate::model::noise_model::{NoiseModel, Products};
+use crate::numbers::normal::{self, Block};
+use crate::numbers::statistics::{Estimate, jackknife};
 use crate::rotor::score::LEVEL;
-use crate::statistics::{Estimate, jackknife};
 
 /// Blocks of time from which an interval means anything.
 pub const BLOCKS_MIN: usize = 5;

@@ -6,8 +6,8 @@
 
 use super::course::{Course, Input};
 use super::least_squares::{self, Rows, Solution, Weighting};
-use crate::noise_model::NoiseModel;
-use crate::normal::{self, Block};
+use crate::model::noise_model::NoiseModel;
+use crate::numbers::normal::{self, Block};
 use crate::rotor::dynamics::Order;
 use crate::rotor::response::Lag;
 

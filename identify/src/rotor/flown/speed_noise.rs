@@ -10,7 +10,7 @@ use rand_core::{Rng, SeedableRng};
 use vehicles::ROTORS_MAX;
 
 use super::least_squares::{self, Prior, Rows, Solution, Weighting};
-use crate::normal::{self, Block};
+use crate::numbers::normal::{self, Block};
 
 /// Beyond this part of the squares of a column, noise hides its signal.
 const HIDDEN: f64 = 0.5;

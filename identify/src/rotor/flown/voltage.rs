@@ -2,8 +2,8 @@
 
 use flights::{Channel, Flight};
 
+use crate::numbers::statistics::{deviation, mean};
 use crate::rotor::plateau::median;
-use crate::statistics::{deviation, mean};
 
 /// Below this part of its variation, the noise of a voltage hardly flattens a slope over it.
 const NOISE_MAX: f64 = 0.1;
