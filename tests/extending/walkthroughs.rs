@@ -62,7 +62,7 @@ fn every_diff_of_the_page_fits_the_tree_and_every_new_file_is_compiled_as_it_sta
         5,
         "a sensor, a law, an effect, a message, a command"
     );
-    for Change { path, is_new, hunks } in &changes {
+    for Change { path, is_new, hunks, .. } in &changes {
         if *is_new {
             assert!(!root().join(path).exists(), "{path} is in the tree already");
             assert_eq!(compiled(path).as_deref(), Some(&*side(&hunks[0], '+')), "{path}");

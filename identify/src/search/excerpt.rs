@@ -172,7 +172,7 @@ mod tests {
         let truth = [effect("mass-error", &[("error", 0.2)]), effect("motor-lag", &[("slowness", -0.3)])];
         let set = simulated(&vehicle, &truth);
         let of_set = || crate::run::problem(&vehicle, &[], &set).expect("usable flights").0;
-        let (mut whole, mut part) = (of_set(), of_set());
+        let (whole, mut part) = (of_set(), of_set());
         let accepted = ["mass-error", "command-delay"].map(|name| candidate(&part, name)).to_vec();
         let before = part.fitted(&part.model.parameters.baseline(), &[]);
         part.weigh(&before, &accepted);
@@ -190,7 +190,7 @@ mod tests {
             asked: Vec::new(),
             is_stopped: false,
         };
-        let tested = on_all(&mut whole, &part, found.clone());
+        let (whole, tested) = on_all(whole, &part, found.clone());
         assert_eq!(tested.accepted, std::slice::from_ref(&mass), "{:?}", tested.withdrawn);
         let [withdrawn] = &tested.withdrawn[..] else { panic!("{:?}", tested.withdrawn) };
         assert_eq!((withdrawn.effect, withdrawn.at_bound), ("command-delay", false));
@@ -199,7 +199,7 @@ mod tests {
         assert!(tested.worths.is_empty() && tested.after.free == mass.free, "{tested:?}");
         // Predictions may ask for an effect that the equations hardly show.
         let asked = vec![found.accepted[1].clone()];
-        let kept = on_all(&mut whole, &part, Selection { asked, ..found });
+        let (_, kept) = on_all(whole, &part, Selection { asked, ..found });
         assert_eq!(kept.accepted.len(), 2, "{:?}", kept.withdrawn);
     }
 
