@@ -42,9 +42,9 @@ fn shortened<'f>(problem: &Problem<'f>, time_s: f64) -> Option<Problem<'f>> {
     })
 }
 
-/// The problem with the noises of its `excerpt`, and the selection that was `found` there, with the parameters fitted on all of it, and refined by
-/// prediction errors again. Every effect is tested once more by them: one with a parameter at its bound is withdrawn, and one that is not beyond
-/// chance beside the others.
+/// Fits the parameters of the selection that was `found` in an `excerpt` on all of the problem, and refines them by prediction errors again. The
+/// problem gets the noises of the excerpt. Every effect is tested once more: one with a parameter at its bound is withdrawn, and one that is not
+/// beyond chance beside the others.
 pub fn on_all<'f>(problem: Problem<'f>, excerpt: &Problem, found: Selection) -> (Problem<'f>, Selection) {
     let problem = Problem { noises: excerpt.noises.clone(), ..problem };
     let before = problem.fitted(&problem.model.parameters.baseline(), &[]);
