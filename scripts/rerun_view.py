@@ -56,7 +56,7 @@ def read(recording):
         topics = {c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values()}
         for attachment in reader.iter_attachments():
             if pathlib.Path(attachment.name).suffix.lower() in MESHES:
-                meshes[attachment.name] = attachment.data
+                meshes[pathlib.PurePosixPath(attachment.name).name] = attachment.data
                 continue
             table = tomllib.loads(attachment.data.decode())
             if any(things in table for things in ("boxes", "meshes", "balls")):

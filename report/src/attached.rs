@@ -8,7 +8,7 @@ use recorder::RecordingError;
 use recorder::reader::Recording;
 use std::collections::BTreeSet;
 use std::io;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 use toml::{Table, Value};
 use vehicles::reader::{Document, Section};
 use vehicles::{EffectEntry, Vehicle};
@@ -40,7 +40,8 @@ pub struct Attached {
     manifest: Table,
     /// The manifest file by file: the included ones first.
     tables: Vec<Table>,
-    /// Texts by file names.
+    /// Texts by the names under which they are attached: those of the files alone, or, where two files have one, the ways from the
+    /// folder that holds them all.
     files: Vec<(String, String)>,
 }
 
@@ -57,10 +58,15 @@ impl Attached {
     }
 
     fn of(files: Vec<(String, String)>) -> Self {
-        let tables = files.iter().filter_map(|(_, text)| text.parse().ok());
-        let is_of_manifest =
-            |table: &Table| ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key));
-        let mut tables: Vec<Table> = tables.filter(is_of_manifest).collect();
+        let tables = files.iter().filter_map(|(name, text)| Some((name, text.parse().ok()?)));
+        let is_of_manifest = |(_, table): &(&String, Table)| {
+            ["process", "set", "vehicle"].iter().any(|key| table.contains_key(*key))
+        };
+        let anchored = |(name, mut table): (&String, Table)| {
+            anchor(&mut table, name, false);
+            table
+        };
+        let mut tables: Vec<Table> = tables.filter(is_of_manifest).map(anchored).collect();
         // The manifest comes first, and its own values count before those of its includes.
         tables.reverse();
         let manifest = tables.iter().cloned().fold(Table::new(), |mut lower, upper| {
@@ -87,7 +93,7 @@ impl Attached {
     #[must_use]
     pub fn airframe(&self, name: &str) -> Option<Airframe> {
         let vehicle = match self.file_of(name, "vehicle") {
-            Some(file) => self.vehicle(&file),
+            Some(file) => self.vehicle(Path::new(&file)),
             None => self.only_vehicle(),
         };
         Airframe::from_files(vehicle?, &[]).ok()
@@ -97,16 +103,17 @@ impl Attached {
     /// scene file. `None` in still air, without a plant, and where its vehicle file is not attached.
     #[must_use]
     pub fn wind(&self, name: &str) -> Option<Wind> {
-        let mut entries = self.vehicle(&self.file_of(name, "vehicle")?)?.effects;
+        let mut entries = self.vehicle(Path::new(&self.file_of(name, "vehicle")?))?.effects;
         let scene = self.file_of(name, "scene");
         entries.extend(scene.map_or_else(Vec::new, |file| self.listed_effects(&file)));
         Wind::of(&resolve(&entries).ok()?)
     }
 
-    /// The effects that the file attached as `file` lists.
-    fn listed_effects(&self, file: &str) -> Vec<EffectEntry> {
+    /// The effects that the file at `path` lists.
+    fn listed_effects(&self, path: &str) -> Vec<EffectEntry> {
         // A manifest of the same name lists none.
-        let listed = self.texts(file).filter_map(|text| read_effects(text, file));
+        let listed =
+            self.named(Path::new(path)).into_iter().filter_map(|(name, text)| read_effects(text, name));
         listed.flatten().collect()
     }
 
@@ -143,13 +150,13 @@ impl Attached {
         self.manifest.get("vehicle").and_then(Value::as_array).into_iter().flatten()
     }
 
-    /// The file that the plant names as `key`, `vehicle` or `scene`, by the name alone under which it is attached.
+    /// The path of the file that the plant names as `key`, `vehicle` or `scene`.
     fn file_of(&self, name: &str, key: &str) -> Option<String> {
         let merged = if name.is_empty() { self.manifest.clone() } else { self.merged(name)? };
         let is_plant = |process: &&Value| process.get("kind").and_then(Value::as_str) == Some("plant");
         let plant = merged.get("process")?.as_table()?.values().find(is_plant)?;
         let file = plant.get(key).or_else(|| plant.get("parameters")?.get(key))?;
-        Some(Path::new(file.as_str()?).file_name()?.to_string_lossy().into_owned())
+        Some(file.as_str()?.to_owned())
     }
 
     /// The set of a vehicle with the vehicle's own values over it.
@@ -174,27 +181,71 @@ impl Attached {
         Table::from_iter([("process".to_owned(), Value::Table(adjusted.collect()))])
     }
 
-    /// The vehicle in the file that is attached as `file`: others, such as manifests, may have the same name.
-    fn vehicle(&self, file: &str) -> Option<Vehicle> {
-        // They are attached by their names alone.
-        let complete = |path: &Path| {
-            let name = path.file_name()?.to_str()?;
-            self.texts(name).find(|text| text.parse().is_ok_and(|table: Table| table.contains_key("rotors")))
-        };
+    /// The vehicle in the file at `path`: others, such as manifests, may have the same name.
+    fn vehicle(&self, path: &Path) -> Option<Vehicle> {
+        let is_complete = |text: &&str| text.parse().is_ok_and(|table: Table| table.contains_key("rotors"));
+        let complete = |path: &Path| self.named(path).into_iter().map(|(_, text)| text).find(is_complete);
         let read =
             |path: &Path| complete(path).map(str::to_owned).ok_or_else(|| io::ErrorKind::NotFound.into());
-        self.texts(file).find_map(|text| Vehicle::parse_with(text, file, &read).ok())
+        self.named(path).into_iter().find_map(|(name, text)| Vehicle::parse_with(text, name, &read).ok())
     }
 
-    fn texts(&self, name: &str) -> impl Iterator<Item = &str> {
-        self.files.iter().filter(move |(attached, _)| attached == name).map(|(_, text)| &**text)
+    /// Names and texts of the files that may be the one at `path`.
+    fn named(&self, path: &Path) -> Vec<(&str, &str)> {
+        named(&self.files, path).into_iter().map(|(name, text)| (&**name, &**text)).collect()
     }
 
     /// The attached vehicle, if the manifest does not name it and there is only one.
     fn only_vehicle(&self) -> Option<Vehicle> {
         let names: BTreeSet<_> = self.files.iter().map(|(name, _)| name).collect();
-        let mut found = names.into_iter().filter_map(|name| self.vehicle(name));
+        let mut found = names.into_iter().filter_map(|name| self.vehicle(Path::new(name)));
         found.next().filter(|_| found.next().is_none())
+    }
+}
+
+/// The attached `files` that may be the one at `path`, by name and content: those whose names have most of its folders, and at least its own
+/// name. Older recordings have several files under one name.
+pub(crate) fn named<'a, T>(files: &'a [(String, T)], path: &Path) -> Vec<&'a (String, T)> {
+    let path = without_ways_up(path);
+    let in_common = |(name, _): &&(String, T)| {
+        let parts = Path::new(name).components().rev().zip(path.components().rev());
+        parts.take_while(|(a, b)| a == b).count()
+    };
+    let most = files.iter().map(|file| in_common(&file)).max().filter(|parts| *parts > 0);
+    files.iter().filter(|file| Some(in_common(file)) == most).collect()
+}
+
+/// `path` without ways down and up again. Nothing is there to be looked at: the files lie in the recording.
+fn without_ways_up(path: &Path) -> PathBuf {
+    let mut short = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if short.file_name().is_some() => {
+                short.pop();
+            }
+            _ => short.push(part),
+        }
+    }
+    short
+}
+
+/// Makes paths of vehicles and scenes, which begin at the manifest that states them, begin where its own `name` begins.
+fn anchor(table: &mut Table, name: &str, is_of_process: bool) {
+    for (key, value) in table {
+        match value {
+            Value::Table(inner) => anchor(inner, name, is_of_process || key == "process"),
+            Value::Array(list) => {
+                let tables = list.iter_mut().filter_map(Value::as_table_mut);
+                tables.for_each(|inner| anchor(inner, name, is_of_process));
+            }
+            Value::String(path) if is_of_process && ["vehicle", "scene"].contains(&&**key) => {
+                if let Some(folder) = Path::new(name).parent().filter(|folder| *folder != Path::new("")) {
+                    *path = without_ways_up(&folder.join(&*path)).to_string_lossy().into_owned();
+                }
+            }
+            _ => {}
+        }
     }
 }
 
@@ -220,6 +271,7 @@ fn put(lower: &mut Table, upper: Table) {
 #[cfg(test)]
 mod tests {
     use super::{Attached, Wind};
+    use std::path::Path;
 
     fn attached(files: &[(&str, &str)]) -> Attached {
         Attached::of(files.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
@@ -244,6 +296,35 @@ mod tests {
         ]);
         assert_eq!(found.body("").unwrap().name, "with drag");
         assert!(found.names().is_empty());
+    }
+
+    #[test]
+    fn files_of_one_name_are_told_by_their_folders() {
+        let manifest = "[process.controller]\nkind = \"pid\"\nvehicle = \"quad.toml\"\n\
+                        [process.plant]\nvehicle = \"../b/quad.toml\"\n";
+        let set = "[process.plant]\nkind = \"plant\"\nvehicle = \"quad.toml\"\n";
+        let light = PLAIN.replace("AscTec Hummingbird", "light");
+        let on_base = "name = \"on a base\"\nbase = \"quad.toml\"\n";
+        let files = [
+            ("a/run.toml", manifest),
+            ("sets/set.toml", set),
+            ("a/quad.toml", PLAIN),
+            ("b/quad.toml", &light),
+            ("b/heavy.toml", on_base),
+        ];
+        assert_eq!(attached(&files).body("").unwrap().name, "light");
+        let of_controller = manifest.replace("../b/quad", "quad");
+        let mut other = files;
+        other[0].1 = &of_controller;
+        assert_eq!(attached(&other).body("").unwrap().name, "AscTec Hummingbird");
+        // The base lies beside the file that names it.
+        let heavy = manifest.replace("../b/quad", "../b/heavy");
+        other[0].1 = &heavy;
+        let light = light.replace("0.480", "0.3");
+        other[3].1 = &light;
+        let mass_kg = attached(&other).vehicle(Path::new("b/heavy.toml")).unwrap().mass_kg;
+        assert!(mass_kg < 0.4, "{mass_kg}");
+        assert_eq!(attached(&other).body("").unwrap().name, "on a base");
     }
 
     #[test]

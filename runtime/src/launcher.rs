@@ -1,5 +1,6 @@
 //! Launches runs: from a checked manifest to the outcome of its run.
 
+use crate::attachment_names::attachment_names;
 use crate::checkpoint::{Checkpoint, Written};
 use crate::checkpoint_writer::{Collector, Writer, WrittenFiles};
 use crate::ctl::control::ControlServer;
@@ -32,7 +33,6 @@ use bus::watch::WatchFiles;
 use diagnostics::Error;
 use inputs::InputFiles;
 use recorder::reader::Recording;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -562,17 +562,21 @@ fn prepare(
     let (files, recorded) = (graph.files.listing_anew(), run_dir.path().join("manifest.toml"));
     let whole = (manifest.path.as_path(), manifest.recorded_text.as_str(), recorded.as_path());
     let texts = manifest.included().map(|(path, text)| (path, text, path));
-    let mut attachments = Vec::new();
+    let (mut paths, mut keys) = (Vec::new(), Vec::new());
     for (path, text, key) in std::iter::once(whole).chain(texts) {
         let key = PathBuf::from(key.to_string_lossy().into_owned());
         files.keep(&key, text.into());
-        attachments.push(attachment(&file_name(path), &key));
         files.bytes(&key)?;
+        paths.push(absolute(path));
+        keys.push(key);
     }
     for path in &graph.models {
-        attachments.push(attachment(&file_name(path), path));
         files.bytes(path).with_context(|| format!("cannot attach {}", path.display()))?;
+        paths.push(absolute(path));
+        keys.push(path.clone());
     }
+    let mut attachments: Vec<_> =
+        attachment_names(&paths).iter().zip(&keys).map(|(name, key)| attachment(name, key)).collect();
     for (name, text) in written {
         let key = run_dir.path().join(name);
         files.keep(&key, text.into_bytes());
@@ -602,9 +606,9 @@ fn figures(graph: &Graph, run_dir: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     has_judge.then(read).transpose()
 }
 
-/// Name under which the file at `path` is attached: it has no slash.
-fn file_name(path: &Path) -> Cow<'_, str> {
-    path.file_name().unwrap_or_default().to_string_lossy()
+/// The absolute path, without ways down and up again.
+fn absolute(path: &Path) -> PathBuf {
+    inputs::tidy(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))
 }
 
 /// Content that a recorder attaches as `name`: the file `key` among those of the run.

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | the manifest, with the place of every value | [`manifest`] |
 //! | the checked plan of a run | [`graph`], `placement`, [`registry`], `program`, `describe`, `describe_programs` |
-//! | a flight of processes or threads | [`launcher`], `options`, [`event`], `outcome`, [`flight`] |
+//! | a flight of processes or threads | [`launcher`], `attachment_names`, `options`, [`event`], `outcome`, [`flight`] |
 //! | its supervisor, which decides | `supervisor`, `processes`, `sidecars`, `watch_clock` |
 //! | what the supervisor sees and touches | `world`, `view`, `host_world`, [`host`], `spawn`, `executed`, `imported`, `role`, `instances` |
 //! | the same supervisor in simulated worlds | `simulation` |
@@ -15,6 +15,7 @@
 //! | files at the user's paths | [`outputs`], [`output_file`], `claimed_file`, `location`, `file_lock`, `process_log` |
 //! | the run directory, and remains of dead runs | [`run_dir`], [`clean`], `descendants`, `process_table`, `host_limits` |
 
+mod attachment_names;
 pub mod checkpoint;
 mod checkpoint_writer;
 mod claimed_file;

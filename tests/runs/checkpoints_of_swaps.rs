@@ -31,7 +31,8 @@ fn a_process_that_is_the_same_as_the_dead_one_is_the_one_of_the_manifest() {
         let on_exit = format!("process.controller.on_exit={on_exit}");
         let args =
             ["run", &hover, "--record", &whole, "--set", &on_exit, "--checkpoint-every", "500ms", "--json"];
-        let mut launch = place.start(&[&args[..], &["--pace", "4", "--set", "run.duration_s=4"]].concat());
+        // The next standby joins by host time: at real time long before the checkpoint.
+        let mut launch = place.start(&[&args[..], &["--pace", "1", "--set", "run.duration_s=4"]].concat());
         launch.hold_at(700);
         rustix::process::kill_process(place.process_of_generation("controller", 0), Signal::KILL).unwrap();
         launch.release();
@@ -50,7 +51,8 @@ fn a_standby_with_another_law_goes_on() {
     let place = Place::new();
     let two = repository("manifests/llp-hlp.toml");
     let (whole, later) = (place.path("a.mcap"), place.path("b.mcap"));
-    let args = ["run", &two, "--record", &whole, "--checkpoint-every", "1s", "--json", "--pace", "4"];
+    // The next standby joins by host time: at real time long before the checkpoint.
+    let args = ["run", &two, "--record", &whole, "--checkpoint-every", "1s", "--json", "--pace", "1"];
     let mut launch = place.start(&[&args[..], &["--set", "run.duration_s=5"]].concat());
     launch.hold_at(700);
     rustix::process::kill_process(place.process_of_generation("controller", 0), Signal::KILL).unwrap();

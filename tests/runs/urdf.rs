@@ -1,6 +1,7 @@
 //! `hummingbus urdf`: what it prints and writes, and what it refuses without leaving a part of a file.
 
 use crate::laps;
+use crate::recordings::open;
 use crate::support::{Place, repository};
 use std::fs;
 use std::path::Path;
@@ -25,6 +26,32 @@ fn a_file_is_what_is_printed_and_a_recording_tells_the_same_as_its_vehicle_file(
         printed.replace("hb_body", "h2/body"),
         "the frame that the plant of h2 publishes"
     );
+}
+
+#[test]
+fn files_of_one_name_in_two_folders_are_told_apart() {
+    let place = Place::new();
+    let vehicle = fs::read_to_string(repository("vehicles/hummingbird.toml")).unwrap();
+    for (folder, mass) in [("a", "0.480"), ("b", "0.960")] {
+        fs::create_dir(place.path(folder)).unwrap();
+        place.write(
+            &format!("{folder}/quad.toml"),
+            vehicle.replace("value = 0.480", &format!("value = {mass}")),
+        );
+    }
+    let hover = fs::read_to_string(repository("manifests/hover.toml")).unwrap();
+    let (hover, _) = hover.split_once("[[pass]]").unwrap();
+    let manifest = hover
+        .replace("duration_s = 12.0", "duration_s = 0.05")
+        .replacen("../vehicles/hummingbird.toml", "b/quad.toml", 1)
+        .replace("../vehicles/hummingbird.toml", "a/quad.toml");
+    let (manifest, recording) = (place.write("run.toml", manifest), place.path("run.mcap"));
+    place.call(&["run", &manifest, "--record", &recording]).with_code(0);
+    let names: Vec<_> = open(&recording).attachments().unwrap().into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names.iter().filter(|name| name.ends_with("/quad.toml")).count(), 2, "{names:?}");
+    let told = place.call(&["urdf", &recording]).with_code(0).output;
+    let heavy = place.call(&["urdf", &place.path("b/quad.toml")]).with_code(0).output;
+    assert_eq!(told.replace("hb_body", "body"), heavy.replace("hb_body", "body"), "the vehicle of the plant");
 }
 
 #[test]

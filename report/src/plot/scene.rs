@@ -1,5 +1,6 @@
 //! The scene of a recording, as its fixed things are drawn: boxes, meshes and balls by their corners and edges.
 
+use crate::attached::named;
 use nalgebra::Vector3;
 use recorder::RecordingError;
 use recorder::reader::Recording;
@@ -159,10 +160,8 @@ pub fn body_names(recording: &Recording) -> Vec<String> {
 
 fn read_scene(recording: &Recording) -> Result<Option<Scene>, RecordingError> {
     let attachments = recording.attachments()?;
-    // They are attached by their names alone.
     let read = |path: &Path| {
-        let name = path.file_name().unwrap_or_default();
-        let found = attachments.iter().find(|(attached, _)| name == attached.as_str());
+        let found = named(&attachments, path).into_iter().next();
         found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::ErrorKind::NotFound.into())
     };
     // An attachment does not say what it is, but no manifest and no vehicle file can be read as a scene.
