@@ -46,7 +46,8 @@ def campaign(
 ) -> Campaign:
     """Flies the campaign `file` into the folder `out`, or what is left of one that was interrupted there.
 
-    `require` is a condition such as `"pass_rate >= 0.99 at 95 %"`. Raises `hummingbus.Error` with the program's own words.
+    `require` is a condition such as `"pass_rate >= 0.99 at 95 %"`. Raises `hummingbus.Error` with the program's own words, and at Ctrl-C
+    `KeyboardInterrupt`: the flights so far stay in `out`.
     """
     words = ["campaign", os.fspath(file), "--out", os.fspath(out), "--json"]
     for option, value in (("--workers", workers), ("--require", require)):
@@ -62,7 +63,8 @@ def identify(
     """Finds what the measured flights of the file `flights` show that their declared vehicle lacks.
 
     Returns the report as `hummingbus identify --json` prints it. The page `report.html` and the new `vehicle.toml` go into the folder
-    `out`. `on_bus` flies the declared and the new vehicle. Raises `hummingbus.Error` with the program's own words.
+    `out`. `on_bus` flies the declared and the new vehicle. Raises `hummingbus.Error` with the program's own words, and at Ctrl-C
+    `KeyboardInterrupt`: the files in `out` have the effects that were found so far.
     """
     words = ["identify", os.fspath(flights), "--out", os.fspath(out), "--json"]
     return report(words if on_bus else [*words, "--no-bus"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -46,11 +47,34 @@ def _is_script(path: str) -> bool:
 
 
 def report(words: Sequence[str], codes: Sequence[int] = (0,)) -> Mapping[str, Any]:
-    """The JSON that the program prints; other exit codes than `codes` raise its own words."""
-    ended = subprocess.run([program(), *words], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    if ended.returncode not in codes:
-        raise _native.Error(ended.stderr.strip())
-    return json.loads(ended.stdout)
+    """The JSON that the program prints; other exit codes than `codes` raise its own words.
+
+    Ctrl-C ends the program, which first writes what it has found so far, and raises `KeyboardInterrupt` with its words.
+    """
+    code, output, said = _call([program(), *words])
+    if code not in codes:
+        raise _native.Error(said.strip())
+    return json.loads(output)
+
+
+def _call(command: Sequence[str]) -> tuple[int, str, str]:
+    """Exit code, output and error output of `command`."""
+    pipe = subprocess.PIPE
+    # In a session of its own, so that Ctrl-C in a terminal reaches it once, from here: a second one would end it at once.
+    process = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    )
+    try:
+        output, said = process.communicate()
+        return process.returncode, output, said
+    except KeyboardInterrupt:
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate()
+        raise KeyboardInterrupt(said.strip()) from None
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
 
 
 def toml(value: Any) -> str:

@@ -477,6 +477,30 @@ fn a_campaign_returns_its_report_and_wrong_files_raise_the_words_of_the_program(
     ));
 }
 
+/// Flights take long enough that some are left when the first has ended.
+#[test]
+fn ctrl_c_lets_a_campaign_write_what_it_has_flown() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let (hover, out) = (repository("manifests/hover.toml"), place.path("out"));
+    let text = format!("manifest = {hover:?}\nflights = 40\nset = [\"run.duration_s=10.0\"]\n");
+    let file = place.write("long.toml", text);
+    python.eval(&format!(
+        "import hummingbus as hb, os, signal, threading, time\n\
+         signal.signal(signal.SIGINT, signal.default_int_handler)\n\
+         def interrupt():\n\
+         \x20   rows = {out:?} + '/rows.jsonl'\n\
+         \x20   while not os.path.exists(rows) or os.path.getsize(rows) == 0: time.sleep(0.01)\n\
+         \x20   os.kill(os.getpid(), signal.SIGINT)\n\
+         threading.Thread(target=interrupt).start()\n\
+         try: hb.campaign({file:?}, {out:?}, workers=1)\n\
+         except KeyboardInterrupt as stop: assert 'was interrupted; the same command flies' in str(stop), stop\n\
+         else: raise AssertionError('nothing ended it')"
+    ));
+    let rows = fs::read_to_string(place.path("out/rows.jsonl")).unwrap();
+    assert!((1..40).contains(&rows.lines().count()), "{rows}");
+}
+
 /// A flight of the Hummingbird, held against one that is declared a tenth heavier.
 const IDENTIFIED: &str = r#"
 import json, os, hummingbus as hb
