@@ -113,6 +113,7 @@ fn asked(graph: &Graph) -> Vec<Asked<'_>> {
 
 /// A message as one side of a topic has it.
 struct Side {
+    process: String,
     /// The process and its port, for people.
     who: String,
     message: Announcement,
@@ -122,7 +123,8 @@ struct Side {
 
 impl Side {
     fn of_port(process: &str, verb: &str, port: &str, message: Announcement, is_built_in: bool) -> Self {
-        Self { who: format!("process `{process}` {verb} its port `{port}`"), message, is_built_in }
+        let who = format!("process `{process}` {verb} its port `{port}`");
+        Self { process: process.to_owned(), who, message, is_built_in }
     }
 }
 
@@ -242,12 +244,18 @@ fn compare(
             "layout mismatch on topic {topic}: process `{}` {verb} its port `{port}` as\n{}\nand {} as\n{}",
             asked.plan.name, declared.layout, other.who, other.message.layout
         );
+        let name = &asked.plan.name;
         let help = if other.is_built_in {
-            "rebuild the program against this version of hummingbus, whose message `hummingbus schema` prints"
+            format!(
+                "rebuild the program of `{name}` against this version of hummingbus, whose message `hummingbus schema` prints"
+            )
         } else {
-            "rebuild the program that has the older message"
+            format!(
+                "rebuild the program of `{name}` or that of `{}`: the one with the older message",
+                other.process
+            )
         };
-        return Err(problem(manifest, &asked.plan.name, "", message, help).into());
+        return Err(problem(manifest, name, "", message, &help).into());
     }
     Ok(())
 }
