@@ -85,7 +85,7 @@ fn a_check_finds_what_a_run_would() {
         // What the program sends is read by a component.
         (pid(), faulty("layout"), "process `pilot` sends its port `set_point` as"),
         (pid(), faulty("layout"), "and process `controller` reads its port `set_point` as"),
-        (pid(), faulty("layout"), "rebuild the program of `controller` against this version"),
+        (pid(), faulty("layout"), "rebuild the program of `pilot` against this version"),
         (controller.clone(), faulty("padding"), "at byte 8, and the fields before it end at 4"),
     ];
     for (controller, pilot, words) in cases {
