@@ -1,6 +1,6 @@
 //! Disturbance observer: the force and torque that a model lacks, as they were seen up to a moment, and as they are expected to go on.
 //!
-//! The residual of each component is an autoregressive process about the flight's own trim (`noise_model`). Its best prediction from
+//! The residual of each component is an autoregressive process (`noise_model`) about the flight's own trim (`own_trim`). Its best prediction from
 //! the samples before is known by its coefficients (Box and Jenkins, Time Series Analysis, chapter 5; in the state space it is the
 //! prediction of a Kalman filter with disturbance states). It begins at what was seen last, and decays to the trim.
 
@@ -9,26 +9,33 @@ use crate::data::rows::column;
 use crate::data::sensing::SensorErrors;
 use crate::model::forecast::{AddedAcceleration, Forecast};
 use crate::model::noise_model::{NoiseModel, Products};
+use crate::model::own_trim;
 use crate::model::problem::Problem;
-use crate::model::whitening::stretches;
+use crate::model::whitening::{mean, stretches};
 
-/// A trim counts by the time that it was seen, against this time: about ten times that over which disturbances of flights
-/// remember themselves; tuned, no source.
-const SETTLED_S: f64 = 2.0;
 /// Disturbances are expected for so long after the start of a window, in s: to the longest horizon of predictions.
 const AHEAD_S: f64 = 1.0;
 
-/// The colour of what a model leaves, by component of a push.
+/// The colour of what a model leaves, and the spread of the flights' trims, by component of a push.
 #[derive(Debug, Clone)]
-pub struct DisturbanceModels([NoiseModel; 6]);
+pub struct DisturbanceModels {
+    noise: [NoiseModel; 6],
+    trim_variances: [f64; 6],
+}
+
+/// Components of a push whose trims are alike: torques about x and y, which the same propellers and batteries cause, forces along x and y, and each
+/// other alone.
+const ALIKE: [&[usize]; 6] = [&[0, 1], &[0, 1], &[2], &[3, 4], &[3, 4], &[5]];
 
 impl DisturbanceModels {
     /// Those of the estimation data under `values`.
     pub fn of(problem: &Problem, values: &[f64]) -> Self {
+        let flights = problem.estimation.iter();
+        let left: Vec<_> =
+            flights.map(|flight| (stretches(flight), columns(problem, flight, values))).collect();
         let mut products: [Products; 6] = Default::default();
-        for flight in &problem.estimation {
-            let stretches = stretches(flight);
-            for (products, column) in products.iter_mut().zip(columns(problem, flight, values)) {
+        for (stretches, columns) in &left {
+            for (products, column) in products.iter_mut().zip(columns) {
                 let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
                 let rows: Vec<f64> = column.iter().map(|row| row - mean).collect();
                 stretches
@@ -37,7 +44,13 @@ impl DisturbanceModels {
                     .for_each(|rows| products.add(rows));
             }
         }
-        Self(products.map(|products| products.model()))
+        let noise = products.map(|products| products.model());
+        let means: [Vec<(f64, f64)>; 6] = std::array::from_fn(|at| {
+            let seen = left.iter().filter(|(_, columns)| !columns[at].is_empty());
+            seen.filter_map(|(stretches, columns)| mean(&columns[at], stretches, &noise[at])).collect()
+        });
+        let alike = |of: &[usize]| of.iter().map(|at| means[*at].clone()).collect::<Vec<_>>();
+        Self { trim_variances: ALIKE.map(|of| own_trim::variance(&alike(of))), noise }
     }
 }
 
@@ -66,16 +79,18 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// The disturbances of `flight` under `values`.
-    pub fn of(problem: &Problem, flight: &Prepared, values: &[f64]) -> Self {
-        let rows = columns(problem, flight, values);
+    /// The disturbances of `flight` under `values`, whose noise and trims are those of `models`.
+    pub fn of(problem: &Problem, models: &DisturbanceModels, flight: &Prepared, values: &[f64]) -> Self {
+        let (rows, stretches) = (columns(problem, flight, values), stretches(flight));
         let knot_s = BOX_STEPS as f64 * flight.layout.clock.step_s;
-        let (mut sum, mut trims) = ([0.0; 6], Vec::new());
-        for at in 0..flight.layout.knots.len() {
-            sum.iter_mut().zip(&rows).for_each(|(sum, row)| *sum += row.get(at).copied().unwrap_or(0.0));
-            trims.push(sum.map(|sum| sum / ((at + 1) as f64 + SETTLED_S / knot_s)));
-        }
-        let first = stretches(flight).into_iter().flat_map(|(first, end)| vec![first; end - first]).collect();
+        let trims: [Vec<f64>; 6] = std::array::from_fn(|at| {
+            let (stretches, variance) =
+                (if rows[at].is_empty() { &[] } else { &stretches[..] }, models.trim_variances[at]);
+            own_trim::estimates(&rows[at], stretches, &models.noise[at], variance)
+        });
+        let at_knot = |knot: usize| trims.each_ref().map(|trims| trims.get(knot).copied().unwrap_or(0.0));
+        let trims = (0..flight.layout.knots.len()).map(at_knot).collect();
+        let first = stretches.into_iter().flat_map(|(first, end)| vec![first; end - first]).collect();
         // Knots stand at the stamps of the poses, windows at the times at which these were taken.
         let late_s = SensorErrors::of(&problem.model.parameters, values).pose_delay_s;
         let time_s = flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot) - late_s).collect();
@@ -102,7 +117,7 @@ impl Observed {
         }
         let count = ((at_s - start_s + AHEAD_S) / self.knot_s).ceil() as usize;
         let mut values = vec![trim; count + 1];
-        for (at, (rows, model)) in self.rows.iter().zip(&models.0).enumerate() {
+        for (at, (rows, model)) in self.rows.iter().zip(&models.noise).enumerate() {
             let Some(past) = rows.get(self.first[last]..=last) else { continue };
             let past: Vec<f64> = past.iter().map(|row| row - trim[at]).collect();
             let away = past.last().copied().into_iter().chain(model.forecast(&past, count));
@@ -157,7 +172,8 @@ mod tests {
         };
         let column: Vec<f64> = (0..4000).map(|_| next()).collect();
         products.add(&column);
-        let models = DisturbanceModels(std::array::from_fn(|_| products.model()));
+        let noise = std::array::from_fn(|_| products.model());
+        let models = DisturbanceModels { noise, trim_variances: [0.0; 6] };
         // The step is at 19.05 s, and known 0.1 s later.
         let before = observed.expected(&models, 19.14);
         assert!(before.at(19.5).iter().all(|push| (push - 1.0).abs() < 1e-9), "the step is not known yet");

@@ -12,6 +12,7 @@
 //! | `noise` | noise of sensors, and what it adds to the errors of predictions |
 //! | `problem` | flights in their roles, beside the model that they are held against |
 //! | `forecast` | pushes that are expected over a window |
+//! | `own_trim` | the trim that one flight alone has, by its past |
 //! | `disturbance` | disturbances as they were seen before a window |
 //! | `predict` | predictions over horizons |
 //! | `steps_ahead` | errors of predictions over several steps, for benchmarks |
@@ -23,6 +24,7 @@ pub mod flight_wind;
 pub mod forecast;
 pub mod noise;
 pub mod noise_model;
+pub mod own_trim;
 pub mod parameter;
 pub mod physics;
 pub mod predict;

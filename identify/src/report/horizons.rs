@@ -83,7 +83,8 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
             let model = &problem.model;
             prepared.map_or_else(|| model.airframe(values), |flight| model.airframe_of(flight, values))
         };
-        let seen = prepared.map_or(Observed::default(), |prepared| Observed::of(problem, prepared, values));
+        let seen =
+            prepared.map_or(Observed::default(), |prepared| Observed::of(problem, &models, prepared, values));
         let turned = measured(&corrected).map(Measured::turning_as_measured);
         let of_test = prepared.filter(|_| flight.role == Role::Test);
         let stages = of_test.map_or(Vec::new(), |flight| stages(problem, flight, values));
