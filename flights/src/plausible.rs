@@ -415,7 +415,13 @@ impl Judge<'_> {
         }
         let outside = high > map.max + tolerance || low < (map.min - tolerance).min(0.0);
         let far = high > 1.5 * map.max + tolerance;
-        let fits = far.then(|| "a vehicle file with their range in its `[command]`".to_owned());
+        let fits = match self.units.unit(quantity) {
+            // No share of a range is beyond it.
+            FRACTION | PERCENT if outside => {
+                Some("a `scale` by which full thrust is the whole range, or `unit = \"count\"`,".to_owned())
+            }
+            _ => far.then(|| "a vehicle file with their range in its `[command]`".to_owned()),
+        };
         if outside || high < map.min {
             return Some(finding(quantity, fits, &what));
         }

@@ -40,6 +40,19 @@ fn data_in_other_units_than_declared_are_found() {
 }
 
 #[test]
+fn shares_beyond_the_range_are_refused() {
+    let percent = CHANNELS.replace("\"count\"", "\"%\"");
+    let of_commands = |command_unit: f64| {
+        let found = findings(&Motion { command_unit, ..Motion::default() }, &percent);
+        found.into_iter().find(|(quantity, _)| *quantity == Quantity::Command).map(|(_, fits)| fits)
+    };
+    // Commands of about 100 of 200.
+    assert_eq!(of_commands(0.5), None);
+    let fits = of_commands(1.4).unwrap();
+    assert!(fits.contains("a `scale` by which full thrust"), "{fits}");
+}
+
+#[test]
 fn a_position_alone_that_is_too_fast_is_found() {
     let channels = without("velocity").replace("attitude =", "# attitude =");
     let mm = Motion { length_unit: 1000.0, ..Motion::default() };
