@@ -87,6 +87,15 @@ impl Fmus {
             .replace("\"sets/", &format!("\"{}/", repository("manifests/sets")));
         place.write(&name.replace(".fmu", ".toml"), text)
     }
+
+    /// The manifest with the FMU of FMI 2.0 and with that of 3.0, and their names.
+    fn of_both_versions(&self, place: &Place) -> [(String, &'static str); 2] {
+        let [two, three] = ["Controller.fmu", "Controller3.fmu"];
+        let text = fs::read_to_string(self.shipped(place, three)).unwrap();
+        let text = text.replace("\naltitude = \"set_point.altitude\"", "\nheight = \"set_point.altitude\"");
+        let text = text.replace("altitude_gain = 12.0", "active = true");
+        [(self.shipped(place, two), two), (place.write("three.toml", text), three)]
+    }
 }
 
 /// Topic of the controller's commands.
@@ -97,31 +106,29 @@ pub(crate) fn fly(place: &Place, manifest: &str, name: &str) -> Ended {
 }
 
 #[test]
-fn a_controller_of_fmi_2_flies_the_hover_and_two_runs_are_the_same_bytes() {
+fn a_controller_of_fmi_2_or_3_flies_the_hover_and_two_runs_are_the_same_bytes() {
     let Some(fmus) = fmus() else { return };
     let place = Place::new();
-    let manifest = fmus.shipped(&place, "Controller.fmu");
-    let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
-        fly(&place, &manifest, name).flown();
-        fs::read(place.path(name)).unwrap()
-    });
-    assert!(first == second, "two runs differ");
-    let recording = Recording::open(Path::new(&place.path("first.mcap"))).unwrap();
-    let attached = recording.attachments().unwrap();
-    let (_, bytes) = attached.iter().find(|(name, _)| name.ends_with("Controller.fmu")).unwrap();
-    assert!(*bytes == fs::read(fmus.path("Controller.fmu")).unwrap(), "another FMU is attached");
+    for (manifest, fmu) in fmus.of_both_versions(&place) {
+        let [first, second] = ["first.mcap", "second.mcap"].map(|name| {
+            fly(&place, &manifest, name).flown();
+            fs::read(place.path(name)).unwrap()
+        });
+        assert!(first == second, "two runs of {fmu} differ");
+        let recording = Recording::open(Path::new(&place.path("first.mcap"))).unwrap();
+        let attached = recording.attachments().unwrap();
+        let (_, bytes) = attached.iter().find(|(name, _)| name.ends_with(fmu)).unwrap();
+        assert!(*bytes == fs::read(fmus.path(fmu)).unwrap(), "another FMU is attached");
+    }
 }
 
 #[test]
 fn one_of_fmi_3_flies_the_same_in_its_own_units() {
     let Some(fmus) = fmus() else { return };
     let place = Place::new();
-    let text = fs::read_to_string(fmus.shipped(&place, "Controller3.fmu")).unwrap();
-    let text = text.replace("\naltitude = \"set_point.altitude\"", "\nheight = \"set_point.altitude\"");
-    let text = text.replace("altitude_gain = 12.0", "active = true");
-    let three = place.write("three.toml", text);
+    let [(two, _), (three, _)] = fmus.of_both_versions(&place);
     fly(&place, &three, "three.mcap").flown();
-    fly(&place, &fmus.shipped(&place, "Controller.fmu"), "two.mcap").flown();
+    fly(&place, &two, "two.mcap").flown();
     let [two, three] = ["two.mcap", "three.mcap"].map(|name| commands(&place, name, TOPIC));
     let difference = two
         .iter()
@@ -152,8 +159,14 @@ pub(crate) fn column(place: &Place, name: &str, topic: &str, field: &str) -> Vec
 fn its_state_goes_over_to_a_successor_and_into_a_checkpoint() {
     let Some(fmus) = fmus() else { return };
     let place = Place::new();
-    let manifest = fmus.shipped(&place, "Controller.fmu");
-    let whole = fs::read_to_string(&manifest).unwrap();
+    for (manifest, _) in fmus.of_both_versions(&place) {
+        require_its_state_goes_over(&fs::read_to_string(&manifest).unwrap());
+    }
+}
+
+/// The FMU of the manifest `whole` gives its state to a successor that is the same, and to a run from a checkpoint.
+fn require_its_state_goes_over(whole: &str) {
+    let place = Place::new();
     let checkpoint = place.path("whole.4000.ckpt");
     place.write("whole.toml", format!("{whole}\n[[checkpoint]]\nat_tick = 4000\n"));
     fly(&place, &place.path("whole.toml"), "whole.mcap").flown();

@@ -73,6 +73,47 @@ fn a_simulation_as_an_fmu_is_valid_and_its_trajectory_is_that_of_the_bus_bit_for
     );
 }
 
+/// A vehicle file alone: its plant and sensors with the commands that the hover has flown.
+#[test]
+fn a_vehicle_file_as_an_fmu_flies_as_on_the_bus_bit_for_bit() {
+    let Some(readers) = std::env::var_os("HUMMINGBUS_READERS") else {
+        return crate::skipped::skip("HUMMINGBUS_READERS with FMPy is not set");
+    };
+    let place = Place::new();
+    let manifest = repository("manifests/hover.toml");
+    place.call(&["run", &manifest, "--record", &place.path("hover.mcap"), "--set", "run.duration_s=2"]);
+    let table = command_table(&place, "controller", &commands(&place, "hover.mcap", TOPIC), 1);
+    let vectors = ["position", "velocity", "angular_velocity"].map(|vector| ("/plant/state", vector, "xyz"));
+    let fields =
+        [&vectors[..], &[("/plant/state", "attitude", "wxyz"), ("/imu/imu", "angular_velocity", "xyz")]];
+    let fields: Vec<(&str, String)> = fields
+        .concat()
+        .into_iter()
+        .flat_map(|(topic, vector, axes)| axes.chars().map(move |axis| (topic, format!("{vector}.{axis}"))))
+        .collect();
+    let names: Vec<String> =
+        fields.iter().map(|(topic, field)| format!("{}.{field}", topic[1..].replace('/', "."))).collect();
+    let vehicle = repository("vehicles/hummingbird.toml");
+    let begun = "process.plant.inputs.command.initial={ command = [76.5, 76.5, 76.5, 76.5] }";
+    for version in ["2", "3"] {
+        let fmu = place.path(&format!("vehicle{version}.fmu"));
+        let outputs = ["--output", "/plant/state", "--output", "/imu/imu"];
+        let export = ["export-fmu", &vehicle, "--fmi", version, "--out", &fmu, "--set", begun];
+        place.call(&[&export[..], &outputs].concat()).with_code(0);
+        let rows = stepped(Path::new(&readers), &fmu, &table, &names);
+        for (index, (topic, field)) in fields.iter().enumerate() {
+            let flown = column(&place, "hover.mcap", topic, field);
+            let differs =
+                flown.iter().zip(&rows).position(|(flown, row)| flown.to_bits() != row[index].to_bits());
+            assert_eq!(
+                (differs, rows.len(), flown.len()),
+                (None, 2000, 2000),
+                "{topic} {field} as FMI {version}"
+            );
+        }
+    }
+}
+
 /// One vehicle of ten, as it flies where the others are not: its own noise and its own walls.
 #[test]
 fn a_vehicle_of_a_manifest_of_ten_is_exported_and_flies_as_it_does_alone() {
