@@ -25,9 +25,9 @@ pub struct NewArguments {
     /// Folder of a new project: vehicle, manifest, gains, campaign, and a controller.
     #[arg(required = true, value_name = "NAME")]
     folder: Option<PathBuf>,
-    /// Language of the project's controller.
-    #[arg(long, value_enum, default_value_t)]
-    language: project::Language,
+    /// Language of the project's controller; without it Rust, or Python where a wheel holds this program.
+    #[arg(long, value_enum)]
+    language: Option<project::Language>,
     /// Checkout of hummingbus that the project's controller builds against.
     #[arg(long, value_name = "FOLDER")]
     sources: Option<PathBuf>,
@@ -66,8 +66,8 @@ pub fn new(arguments: &NewArguments) -> Result<bool> {
     }
 }
 
-fn new_project(folder: &Path, language: project::Language, sources: Option<&Path>) -> Result<bool> {
-    project::make(folder, language, sources)?;
+fn new_project(folder: &Path, language: Option<project::Language>, sources: Option<&Path>) -> Result<bool> {
+    let language = project::make(folder, language, sources)?;
     let shown = quoted(folder);
     print_text(&format!(
         "{shown}: a project with a vehicle, a manifest, gains, a campaign and a controller in {}\n\

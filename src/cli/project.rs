@@ -50,10 +50,9 @@ const FILES: [(&str, &str); 6] = [
 ];
 
 /// Language of a project's controller.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Language {
     /// Rust, built with Cargo.
-    #[default]
     Rust,
     /// C++17, built with CMake.
     Cpp,
@@ -128,17 +127,26 @@ impl Language {
     }
 }
 
-/// Makes the project `folder` with a controller in `language`. The controller builds against the `sources` of hummingbus; where
-/// absent, against the sources of this program if they are still there, or else against its published version.
+/// Makes the project `folder` with a controller in `language`, where absent in Rust, or in Python if this program is a wheel's. The controller
+/// builds against the `sources` of hummingbus; where absent, against the wheel, against the sources of this program if they are still there, or else
+/// against its published version.
 ///
 /// # Errors
 /// If the name is not suitable, the folder exists, its parent does not, or it cannot be written. Nothing is left then.
-pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result<()> {
+pub fn make(folder: &Path, language: Option<Language>, sources: Option<&Path>) -> Result<Language> {
     let name = name_of(folder)?;
+    let wheel = std::env::current_exe().ok().and_then(|program| environment_of_wheel(&program));
+    let language = language.unwrap_or(if wheel.is_some() { Language::Python } else { Language::Rust });
     if folder.symlink_metadata().is_ok() {
         bail!("{} already exists; choose another name, or remove it first", folder.display());
     }
-    let sources = sources.map_or_else(built_from, |sources| required(sources).map(Some))?;
+    let sources = match (sources, &wheel) {
+        (Some(sources), _) => Some(required(sources)?),
+        // Where it was built is nothing to who has installed it.
+        (None, Some(_)) => None,
+        (None, None) => built_from(),
+    };
+    let wheel = wheel.filter(|_| sources.is_none());
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !parent.is_dir() {
         bail!("cannot make a folder in {}: there is no such folder; make it first", parent.display());
@@ -153,9 +161,35 @@ pub fn make(folder: &Path, language: Language, sources: Option<&Path>) -> Result
     let whole = draft.path().join(name);
     let templates = language.templates();
     for (path, template) in FILES.iter().chain(templates.files) {
-        write(&whole.join(path), &filled(template, name, templates, sources.as_deref()))?;
+        let text = filled(template, name, templates, sources.as_deref(), wheel.as_deref());
+        write(&whole.join(path), &text)?;
     }
-    fs::rename(&whole, parent.join(name)).with_context(|| format!("cannot make {}", folder.display()))
+    fs::rename(&whole, parent.join(name)).with_context(|| format!("cannot make {}", folder.display()))?;
+    Ok(language)
+}
+
+/// The environment of Python that has the wheel of `program` installed: the folder above `lib/python3.X/site-packages/hummingbus/bin`. `None` of a
+/// program outside of a wheel.
+fn environment_of_wheel(program: &Path) -> Option<PathBuf> {
+    let package = program.parent()?.parent()?;
+    let is_wheel =
+        package.ends_with("site-packages/hummingbus") || package.ends_with("dist-packages/hummingbus");
+    package.ancestors().nth(4).filter(|_| is_wheel).map(Path::to_owned)
+}
+
+/// The command that makes `controller/venv`, an environment of Python that has the package.
+fn environment(sources: Option<&Path>, wheel: Option<&Path>) -> String {
+    match wheel {
+        Some(found) if found.join("pyvenv.cfg").is_file() => {
+            format!("ln -s {} controller/venv", quoted(found))
+        }
+        Some(_) => "python3 -m venv --system-site-packages controller/venv".to_owned(),
+        None => {
+            let package =
+                sources.map_or_else(|| "hummingbus".to_owned(), |path| quoted(&path.join("python")));
+            format!("python3 -m venv controller/venv && controller/venv/bin/pip install {package}")
+        }
+    }
 }
 
 /// The last component of `folder`, which names a Cargo package too.
@@ -174,9 +208,8 @@ fn name_of(folder: &Path) -> Result<&str> {
 }
 
 /// The sources that this program was built from, if they are still there in the same version.
-fn built_from() -> Result<Option<PathBuf>> {
-    let sources = PathBuf::from(BUILT_FROM);
-    Ok(Some(sources).filter(|sources| is_source(sources)))
+fn built_from() -> Option<PathBuf> {
+    Some(PathBuf::from(BUILT_FROM)).filter(|sources| is_source(sources))
 }
 
 fn is_source(folder: &Path) -> bool {
@@ -198,7 +231,13 @@ fn required(sources: &Path) -> Result<PathBuf> {
 }
 
 /// A template with the project's name, its language, and what its controller builds against.
-fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Path>) -> String {
+fn filled(
+    template: &str,
+    name: &str,
+    language: &Templates,
+    sources: Option<&Path>,
+    wheel: Option<&Path>,
+) -> String {
     let path = |folder: &str| {
         sources.map(|sources| sources.join(folder).to_string_lossy().trim_end_matches('/').to_owned())
     };
@@ -211,7 +250,6 @@ fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Pat
         .replace("@missing@", MISSING_LIBRARY)
         .replace("@version@", env!("CARGO_PKG_VERSION"))
         .replace("@path@", &path("bindings/c").unwrap_or_default());
-    let package = path("python").map_or_else(|| "hummingbus".to_owned(), |path| quoted(Path::new(&path)));
     // The paths last: one may have the project's name in it.
     template
         .replace("@section@\n", language.section)
@@ -223,7 +261,7 @@ fn filled(template: &str, name: &str, language: &Templates, sources: Option<&Pat
         .replace("@bus@", &dependency("bus"))
         .replace("@hummingbus@", &dependency(""))
         .replace("@library@\n", &library)
-        .replace("@package@", &package)
+        .replace("@environment@", &environment(sources, wheel))
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {
@@ -235,12 +273,28 @@ fn write(path: &Path, text: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{CPP, filled};
+    use super::{CPP, environment, environment_of_wheel, filled};
     use std::path::Path;
 
     #[test]
+    fn a_project_of_a_wheel_flies_with_the_wheel() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("lib/python3.11/site-packages/hummingbus/bin/hummingbus");
+        let wheel = environment_of_wheel(&program);
+        assert_eq!(wheel.as_deref(), Some(folder.path()));
+        assert_eq!(environment_of_wheel(Path::new("/usr/bin/hummingbus")), None);
+        assert_eq!(environment_of_wheel(&folder.path().join("target/release/hummingbus")), None);
+        let system = environment(None, wheel.as_deref());
+        assert_eq!(system, "python3 -m venv --system-site-packages controller/venv");
+        std::fs::write(folder.path().join("pyvenv.cfg"), "").unwrap();
+        let linked = environment(None, wheel.as_deref());
+        assert_eq!(linked, format!("ln -s {} controller/venv", folder.path().display()));
+        assert!(environment(Some(Path::new("/sources")), None).ends_with("pip install /sources/python"));
+    }
+
+    #[test]
     fn a_project_whose_library_is_missing_says_how_to_name_it() {
-        let file = |sources| filled(include_str!("project/cpp/CMakeLists.txt"), "quad", &CPP, sources);
+        let file = |sources| filled(include_str!("project/cpp/CMakeLists.txt"), "quad", &CPP, sources, None);
         let (installed, built) = (file(None), file(Some(Path::new("/sources"))));
         for text in [&installed, &built] {
             assert!(text.contains("cmake -DCMAKE_PREFIX_PATH=FOLDER -S controller"), "{text}");

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A controller of height, roll and pitch, as a program of its own."""
 
-# If this import fails, install the package: `controller/venv/bin/pip install @package@`, as README.md says.
+# If this import fails, make the environment again, as README.md says: @environment@
 import hummingbus as hb
 
 
