@@ -13,15 +13,19 @@ use crate::model::own_trim;
 use crate::model::problem::Problem;
 use crate::model::whitening::{mean, stretches};
 
+/// While effects are searched for, a trim counts by the time that it was seen, against this time: about ten times that over which disturbances of
+/// flights remember themselves; tuned, no source.
+const SETTLED_S: f64 = 2.0;
 /// Disturbances are expected for so long after the start of a window, in s: to the longest horizon of predictions.
 const AHEAD_S: f64 = 1.0;
 
-/// The colour of what a model leaves, and the spread of the flights' trims, by component of a push.
+/// The colour of what a model leaves, by component of a push.
 #[derive(Debug, Clone)]
-pub struct DisturbanceModels {
-    noise: [NoiseModel; 6],
-    trim_variances: [f64; 6],
-}
+pub struct DisturbanceModels([NoiseModel; 6]);
+
+/// Variances of the flights' trims, by component of a push.
+#[derive(Debug, Clone, Copy)]
+pub struct TrimVariances([f64; 6]);
 
 /// Components of a push whose trims are alike: torques about x and y, which the same propellers and batteries cause, forces along x and y, and each
 /// other alone.
@@ -30,12 +34,10 @@ const ALIKE: [&[usize]; 6] = [&[0, 1], &[0, 1], &[2], &[3, 4], &[3, 4], &[5]];
 impl DisturbanceModels {
     /// Those of the estimation data under `values`.
     pub fn of(problem: &Problem, values: &[f64]) -> Self {
-        let flights = problem.estimation.iter();
-        let left: Vec<_> =
-            flights.map(|flight| (stretches(flight), columns(problem, flight, values))).collect();
         let mut products: [Products; 6] = Default::default();
-        for (stretches, columns) in &left {
-            for (products, column) in products.iter_mut().zip(columns) {
+        for flight in &problem.estimation {
+            let stretches = stretches(flight);
+            for (products, column) in products.iter_mut().zip(columns(problem, flight, values)) {
                 let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
                 let rows: Vec<f64> = column.iter().map(|row| row - mean).collect();
                 stretches
@@ -44,13 +46,23 @@ impl DisturbanceModels {
                     .for_each(|rows| products.add(rows));
             }
         }
-        let noise = products.map(|products| products.model());
-        let means: [Vec<(f64, f64)>; 6] = std::array::from_fn(|at| {
-            let seen = left.iter().filter(|(_, columns)| !columns[at].is_empty());
-            seen.filter_map(|(stretches, columns)| mean(&columns[at], stretches, &noise[at])).collect()
-        });
+        Self(products.map(|products| products.model()))
+    }
+}
+
+impl TrimVariances {
+    /// Those of the estimation data under `values`, whose noise is that of `models`.
+    pub fn of(problem: &Problem, models: &DisturbanceModels, values: &[f64]) -> Self {
+        let mut means: [Vec<(f64, f64)>; 6] = Default::default();
+        for flight in &problem.estimation {
+            let stretches = stretches(flight);
+            let columns = columns(problem, flight, values);
+            for ((means, column), model) in means.iter_mut().zip(&columns).zip(&models.0) {
+                means.extend((!column.is_empty()).then(|| mean(column, &stretches, model)).flatten());
+            }
+        }
         let alike = |of: &[usize]| of.iter().map(|at| means[*at].clone()).collect::<Vec<_>>();
-        Self { trim_variances: ALIKE.map(|of| own_trim::variance(&alike(of))), noise }
+        Self(ALIKE.map(|of| own_trim::variance(&alike(of))))
     }
 }
 
@@ -79,22 +91,40 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// The disturbances of `flight` under `values`, whose noise and trims are those of `models`.
-    pub fn of(problem: &Problem, models: &DisturbanceModels, flight: &Prepared, values: &[f64]) -> Self {
-        let (rows, stretches) = (columns(problem, flight, values), stretches(flight));
+    /// The disturbances of `flight` under `values`.
+    pub fn of(problem: &Problem, flight: &Prepared, values: &[f64]) -> Self {
+        let rows = columns(problem, flight, values);
         let knot_s = BOX_STEPS as f64 * flight.layout.clock.step_s;
-        let trims: [Vec<f64>; 6] = std::array::from_fn(|at| {
-            let (stretches, variance) =
-                (if rows[at].is_empty() { &[] } else { &stretches[..] }, models.trim_variances[at]);
-            own_trim::estimates(&rows[at], stretches, &models.noise[at], variance)
-        });
-        let at_knot = |knot: usize| trims.each_ref().map(|trims| trims.get(knot).copied().unwrap_or(0.0));
-        let trims = (0..flight.layout.knots.len()).map(at_knot).collect();
-        let first = stretches.into_iter().flat_map(|(first, end)| vec![first; end - first]).collect();
+        let (mut sum, mut trims) = ([0.0; 6], Vec::new());
+        for at in 0..flight.layout.knots.len() {
+            sum.iter_mut().zip(&rows).for_each(|(sum, row)| *sum += row.get(at).copied().unwrap_or(0.0));
+            trims.push(sum.map(|sum| sum / ((at + 1) as f64 + SETTLED_S / knot_s)));
+        }
+        let first = stretches(flight).into_iter().flat_map(|(first, end)| vec![first; end - first]).collect();
         // Knots stand at the stamps of the poses, windows at the times at which these were taken.
         let late_s = SensorErrors::of(&problem.model.parameters, values).pose_delay_s;
         let time_s = flight.layout.knots.iter().map(|knot| flight.layout.clock.at(*knot) - late_s).collect();
         Self { knot_s, lag_s: lag_s(flight), time_s, first, rows, trims }
+    }
+
+    /// The same about the best estimates of the trims of `flight`, which settle as fast as their `variances` allow. A search does without: such trims
+    /// take what an effect is worth.
+    pub fn about_own_trims(
+        mut self,
+        flight: &Prepared,
+        models: &DisturbanceModels,
+        variances: &TrimVariances,
+    ) -> Self {
+        let stretches = stretches(flight);
+        let trims: [Vec<f64>; 6] = std::array::from_fn(|at| {
+            let column = &self.rows[at];
+            let stretches = if column.is_empty() { &[] } else { &stretches[..] };
+            own_trim::estimates(column, stretches, &models.0[at], variances.0[at])
+        });
+        for (knot, trim) in self.trims.iter_mut().enumerate() {
+            *trim = trims.each_ref().map(|trims| trims.get(knot).copied().unwrap_or(0.0));
+        }
+        self
     }
 
     /// The last knot that is known at `at_s`.
@@ -117,7 +147,7 @@ impl Observed {
         }
         let count = ((at_s - start_s + AHEAD_S) / self.knot_s).ceil() as usize;
         let mut values = vec![trim; count + 1];
-        for (at, (rows, model)) in self.rows.iter().zip(&models.noise).enumerate() {
+        for (at, (rows, model)) in self.rows.iter().zip(&models.0).enumerate() {
             let Some(past) = rows.get(self.first[last]..=last) else { continue };
             let past: Vec<f64> = past.iter().map(|row| row - trim[at]).collect();
             let away = past.last().copied().into_iter().chain(model.forecast(&past, count));
@@ -172,8 +202,7 @@ mod tests {
         };
         let column: Vec<f64> = (0..4000).map(|_| next()).collect();
         products.add(&column);
-        let noise = std::array::from_fn(|_| products.model());
-        let models = DisturbanceModels { noise, trim_variances: [0.0; 6] };
+        let models = DisturbanceModels(std::array::from_fn(|_| products.model()));
         // The step is at 19.05 s, and known 0.1 s later.
         let before = observed.expected(&models, 19.14);
         assert!(before.at(19.5).iter().all(|push| (push - 1.0).abs() < 1e-9), "the step is not known yet");

@@ -5,7 +5,7 @@ use crate::data::measured::Measured;
 use crate::data::parts;
 use crate::data::prepared::Prepared;
 use crate::data::sensing::SensorErrors;
-use crate::model::disturbance::{DisturbanceModels, Observed};
+use crate::model::disturbance::{DisturbanceModels, Observed, TrimVariances};
 use crate::model::forecast::Forecast;
 use crate::model::predict::{Errors, WindowEnd, components, errors};
 use crate::model::problem::Problem;
@@ -59,6 +59,7 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
     let declared = problem.model.parameters.baseline();
     let sensor_errors = SensorErrors::of(&problem.model.parameters, values);
     let models = DisturbanceModels::of(problem, values);
+    let trims = TrimVariances::of(problem, &models, values);
     let of_flight = |flight: &Flight| {
         let mut predictions = Vec::new();
         let prepared = problem.flights().find(|prepared| prepared.flight.name == flight.name);
@@ -83,8 +84,9 @@ pub fn predictions(problem: &Problem, set: &FlightSet, values: &[f64]) -> Vec<Pr
             let model = &problem.model;
             prepared.map_or_else(|| model.airframe(values), |flight| model.airframe_of(flight, values))
         };
-        let seen =
-            prepared.map_or(Observed::default(), |prepared| Observed::of(problem, &models, prepared, values));
+        let seen = prepared.map_or(Observed::default(), |prepared| {
+            Observed::of(problem, prepared, values).about_own_trims(prepared, &models, &trims)
+        });
         let turned = measured(&corrected).map(Measured::turning_as_measured);
         let of_test = prepared.filter(|_| flight.role == Role::Test);
         let stages = of_test.map_or(Vec::new(), |flight| stages(problem, flight, values));

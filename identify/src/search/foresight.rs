@@ -241,8 +241,7 @@ pub fn ends(
     let errors = SensorErrors::of(&problem.model.parameters, values);
     let measured = flight.recent_measured.at(errors, || measured(flight, &errors));
     let Some(measured) = measured.as_ref() else { return vec![Vec::new(); horizons_s.len()] };
-    let airframe = problem.model.airframe_of(flight, values);
-    let seen = Observed::of(problem, models, flight, values);
+    let (airframe, seen) = (problem.model.airframe_of(flight, values), Observed::of(problem, flight, values));
     measured.ends_within(airframe, horizons_s, |from_s| seen.expected(models, from_s))
 }
 
