@@ -93,6 +93,8 @@ struct Advance {
     phase: Option<Phase>,
     /// True if every node has joined as far as the next phase asks: then it is the clock's turn.
     awaits_phase: bool,
+    /// Node and generation of the backup that joins: when it has joined, the others, and the clock, have their turn.
+    joining: Option<(usize, u32)>,
     /// Ticks that may be computed.
     granted: u32,
     /// Ticks that the instance in each slot has completed.

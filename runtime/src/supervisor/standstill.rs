@@ -48,6 +48,7 @@ impl<W: World> Supervisor<'_, W> {
         Advance {
             phase: Some(view.phase),
             awaits_phase: view.phase < Phase::Running && straggler == Some(Role::Clock),
+            joining: self.decisions.replacements.joining().map(|(node, generation, ..)| (node, generation)),
             granted: view.granted,
             done: view.slots.iter().map(|slot| slot.done).collect(),
         }
