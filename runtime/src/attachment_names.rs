@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// The names of the files at `paths`, absolute ones, in their order: those of the files alone. Where two files in different folders have one
-/// name, each name of all has the way from the innermost folder that holds them all, so that a file can be told by the file that names it.
+/// name, the names are paths from the innermost folder that holds them all. So a file is found by the path that another one states.
 pub fn attachment_names(paths: &[PathBuf]) -> Vec<String> {
     let mut places = BTreeMap::new();
     let differ = paths.iter().all(|path| *places.entry(path.file_name()).or_insert(path) == path);

@@ -1,15 +1,14 @@
 //! The trim that one flight alone has, as its past shows it.
 //!
 //! A trim is a constant among coloured noise. Over flights it is a random effect with mean zero: the model has what all flights share. So its best
-//! estimate is the posterior mean under the spread of the trims: of the innovations y of a component and those of one, x, up to a moment,
-//! Σ x y / (Σ x² + σ² / τ²), with the variance σ² of an innovation and τ² of the trims (Searle, Casella and McCulloch, Variance
-//! Components, 1992, section 7.4). docs/decisions/058-own-trims.md has what this replaced.
+//! estimate is the posterior mean under the spread of the trims, Σ x y / (Σ x² + σ² / τ²). Here y are the innovations of a component up to a
+//! moment, x those of a constant of one, σ² their variance, and τ² that of the trims. The source is Searle, Casella and McCulloch, Variance Components
+//! (1992), section 7.4. docs/decisions/058-own-trims.md has what this replaced.
 
 use crate::model::noise_model::NoiseModel;
 use crate::model::whitening::spread;
 
-/// Variance of the trims about the model, by the means of flights with their variances, one list for each of several components whose trims are alike.
-/// A fit has taken the common part off, so that it is at least the variance about the centre. What the noise alone makes is subtracted.
+/// Variance of the trims about the model, by the means of flights with their variances: a list for each of several components that are alike. A fit has taken the common part off, so that it is at least the variance about the centre. What the noise alone makes is subtracted.
 pub fn variance(components: &[Vec<(f64, f64)>]) -> f64 {
     let (mut excess, mut scale) = (0.0, 0.0);
     for (mean, variance) in components.iter().flatten() {
