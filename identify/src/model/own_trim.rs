@@ -8,7 +8,8 @@
 use crate::model::noise_model::NoiseModel;
 use crate::model::whitening::spread;
 
-/// Variance of the trims about the model, by the means of flights with their variances: a list for each of several components that are alike. A fit has taken the common part off, so that it is at least the variance about the centre. What the noise alone makes is subtracted.
+/// Variance of the trims about the model, by the means of flights with their variances: a list for each of several components that are alike. A
+/// fit has taken the common part off, so that it is at least the variance about the centre. What the noise alone makes is subtracted.
 pub fn variance(components: &[Vec<(f64, f64)>]) -> f64 {
     let (mut excess, mut scale) = (0.0, 0.0);
     for (mean, variance) in components.iter().flatten() {
