@@ -133,6 +133,10 @@ class Component:
         """Computes one tick."""
         raise NotImplementedError
 
+    def take_over(self, sent: Mapping[str, Any]) -> None:
+        """Called before the step at which this node takes another's place without its state: `sent` has copies of what that
+        process sent last, by output, to go on from without a jump."""
+
 
 def run_node(
     component: type[Component] | Callable[..., None],
@@ -184,9 +188,13 @@ def _run(component: Any, inputs: Any, outputs: Any, state: Any) -> None:
         message = of(declared[2])
         node.declare_state(message._description, message.dtype)
     of_node = Node(node.name, node.period_s, node.seed, parameters, node)
-    step = component(of_node).step if is_class else component
+    made = component(of_node) if is_class else None
+    step = component if made is None else made.step
+    # Only of a component that has its own: it costs a look at each tick.
+    follows = made is not None and getattr(component, "take_over", None) is not Component.take_over
     parameters._require_all_read()
     # Objects that are there now stay: the collector need not look at them again at every tick.
     gc.collect()
     gc.freeze()
-    node.run(step if not absent else lambda tick, **messages: step(tick, **messages, **absent))
+    called = step if not absent else lambda tick, **messages: step(tick, **messages, **absent)
+    node.run(called, getattr(made, "take_over", None) if follows else None)

@@ -111,13 +111,15 @@ impl Node {
         Ok(())
     }
 
-    /// Calls `step(tick, **messages)` at every due tick until the run ends. False if the launcher ended it early.
-    fn run(slf: &Bound<'_, Self>, step: Py<PyAny>) -> PyResult<bool> {
+    /// Calls `step(tick, **messages)` at every due tick until the run ends. False if the launcher ended it early. Where given, `take_over(sent)` is
+    /// called before the step of a take-over without state, with copies of what the process before sent last, by output.
+    #[pyo3(signature = (step, take_over=None))]
+    fn run(slf: &Bound<'_, Self>, step: Py<PyAny>, take_over: Option<Py<PyAny>>) -> PyResult<bool> {
         let py = slf.py();
         // Borrowed no longer than this: a step that asks the node is answered in words.
         let mut declared = slf.try_borrow_mut()?;
         let node = declared.node.take().ok_or_else(|| raised("the node runs already"))?;
-        let caller = Caller::new(py, &mut declared, step)?;
+        let caller = Caller::new(py, &mut declared, step, take_over)?;
         drop(declared);
         let ended = py.detach(|| {
             // What the closure holds is used by this thread alone.
@@ -160,6 +162,7 @@ impl Port {
 /// Steps of a Python function.
 struct Caller {
     step: Py<PyAny>,
+    take_over: Option<Py<PyAny>>,
     inputs: Vec<Port>,
     outputs: Vec<Port>,
     /// Arguments of the step by their names; the state, which stays where it is, is one of them.
@@ -169,7 +172,7 @@ struct Caller {
 }
 
 impl Caller {
-    fn new(py: Python<'_>, node: &mut Node, step: Py<PyAny>) -> PyResult<Self> {
+    fn new(py: Python<'_>, node: &mut Node, step: Py<PyAny>, take_over: Option<Py<PyAny>>) -> PyResult<Self> {
         let (arrays, messages) = (Arrays::new(py)?, PyDict::new(py));
         if let Some(State { memory, size, dtype }) = node.state.take() {
             // SAFETY: this memory stays as long as the process lives; the bus changes it between steps only.
@@ -178,6 +181,7 @@ impl Caller {
         }
         Ok(Self {
             step,
+            take_over,
             inputs: std::mem::take(&mut node.inputs),
             outputs: std::mem::take(&mut node.outputs),
             messages: messages.unbind(),
@@ -193,7 +197,23 @@ impl Caller {
         ports.find(|port| port.places.is_kept(py)).map_or(Ok(()), |port| Err(port.kept()))
     }
 
+    /// Tells the component what the process before it sent last, where this tick knows it.
+    fn call_take_over(&self, py: Python<'_>, tick: &DynamicTick<'_, '_>) -> PyResult<()> {
+        let Some(take_over) = &self.take_over else { return Ok(()) };
+        let sent = PyDict::new(py);
+        for Port { name, number, places } in &self.outputs {
+            if let Some(bytes) = tick.predecessor(*number).map_err(raised)? {
+                sent.set_item(name, self.arrays.copied(py, bytes, places.dtype())?)?;
+            }
+        }
+        if !sent.is_empty() {
+            take_over.bind(py).call1((sent,))?;
+        }
+        Ok(())
+    }
+
     fn call_with_messages(&mut self, py: Python<'_>, tick: &mut DynamicTick<'_, '_>) -> PyResult<()> {
+        self.call_take_over(py, tick)?;
         let messages = self.messages.bind(py);
         for Port { name, number, places } in &mut self.inputs {
             let bytes = tick.input(*number).map_err(raised)?;

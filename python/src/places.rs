@@ -2,7 +2,7 @@
 
 use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::{PyMemoryView, PyTuple};
+use pyo3::types::{PyBytes, PyMemoryView, PyTuple};
 use std::collections::BTreeMap;
 
 /// `PyBUF_READ` and `PyBUF_WRITE` of Python's header, part of its stable interface.
@@ -67,7 +67,24 @@ impl Arrays {
     }
 }
 
+impl Arrays {
+    /// Array of a copy of the message in `bytes`.
+    pub(crate) fn copied<'py>(
+        &self,
+        py: Python<'py>,
+        bytes: &[u8],
+        dtype: &Py<PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.ndarray.bind(py).call1((&self.no_dimension, dtype, PyBytes::new(py, bytes)))
+    }
+}
+
 impl Places {
+    /// Type of numpy of the messages.
+    pub(crate) fn dtype(&self) -> &Py<PyAny> {
+        &self.dtype
+    }
+
     pub(crate) fn new(dtype: Py<PyAny>, is_writable: bool) -> Self {
         Self { is_writable, dtype, places: Vec::new(), by_address: BTreeMap::new(), current: None }
     }

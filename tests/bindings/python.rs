@@ -140,6 +140,30 @@ fn a_controller_in_python_takes_over_from_pid_with_its_state_and_pid_from_it() {
     assert!(rms.len() == 4 && rms.iter().all(|count| *count < 1e-6), "{rms:?}\n{ended}");
 }
 
+/// The pilot before has another state.
+#[test]
+fn a_node_that_gets_no_state_knows_what_its_predecessor_sent_last() {
+    let Some(python) = python() else { return };
+    let place = Place::new();
+    let code = "class Keep(hb.Component):\n\
+                \x20   inputs, outputs = {'state': 'PlantState'}, {'set_point': 'SetPoint'}\n\
+                \x20   altitude = 0.0\n\
+                \x20   def take_over(self, sent): self.altitude = float(sent['set_point']['altitude'])\n\
+                \x20   def step(self, tick, state, set_point): set_point['altitude'] = self.altitude\n\
+                hb.run_node(Keep)\n";
+    let swap = "[process.recorder]\nkind = \"recorder\"\n[[swap]]\nprocess = \"pilot\"\nat_tick = 100\n[swap.with]\n";
+    let text = fs::read_to_string(hover(&place, code, swap)).unwrap();
+    // The program is the successor of the pilot of the flight.
+    let (before, program) = text.split_once("[process.pilot]\n").unwrap();
+    let (program, swap) = program.split_once("[process.recorder]").unwrap();
+    let program = program.lines().filter(|line| !line.starts_with("outputs")).collect::<Vec<_>>().join("\n");
+    let pilot = "[process.pilot]\nkind = \"pilot\"\nparameters = { initial_altitude_m = 1.25 }\n";
+    let manifest = place.write("swap.toml", format!("{before}{pilot}[process.recorder]{swap}{program}\n"));
+    python.call(&place, &["run", &manifest, "--record", &place.path("swap.mcap")]).with_code(0);
+    let altitudes = crate::fmu::column(&place, "swap.mcap", "/pilot/set_point", "altitude");
+    assert!(altitudes.len() == 300 && altitudes.iter().all(|altitude| *altitude == 1.25), "{altitudes:?}");
+}
+
 #[test]
 fn a_run_with_a_controller_in_python_goes_on_from_a_checkpoint_with_the_same_bytes() {
     let Some(python) = python() else { return };
