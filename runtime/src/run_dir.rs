@@ -560,7 +560,12 @@ fn choose(mut runs: Vec<LiveRun>, run_id: Option<&str>, here: &Here) -> anyhow::
     match (index, run_id, runs.len()) {
         (_, _, 0) => bail!("no run of this user is alive; `hummingbus run MANIFEST` starts one"),
         (Some(index), Some(_), _) | (Some(index), None, 1) => Ok(runs.swap_remove(index)),
-        (_, None, count) => bail!("{count} runs are alive; choose one with --run:{}", listed(&runs)),
+        (_, None, count) => {
+            let is_any_own = runs.iter().any(|run| here.has(&run.entry));
+            let none =
+                if is_any_own { "" } else { ", none of them started in this folder and on this terminal" };
+            bail!("{count} runs are alive{none}; choose one with --run:{}", listed(&runs))
+        }
         (None, Some(run_id), _) => bail!("no run `{run_id}` is alive; there are:{}", listed(&runs)),
     }
 }
@@ -688,7 +693,8 @@ mod tests {
         assert_eq!(chosen(&[1], None).unwrap(), "2-b");
         assert_eq!(chosen(&[1], Some("3-c")).unwrap(), "3-c");
         assert!(chosen(&[1, 2], None).unwrap_err().to_string().contains("3 runs are alive"));
-        assert!(chosen(&[], None).is_err());
+        let foreign = chosen(&[], None).unwrap_err().to_string();
+        assert!(foreign.contains("none of them started in this folder"), "{foreign}");
     }
 
     #[test]
