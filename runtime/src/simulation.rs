@@ -158,6 +158,15 @@ fn a_clock_is_not_blamed_for_the_time_in_which_nodes_join() {
     }
 }
 
+/// The same of a backup: while it joins, everybody waits, and then it is the clock's turn.
+#[test]
+fn a_clock_is_not_blamed_for_the_time_in_which_a_backup_joins() {
+    for seed in 0..300 {
+        let life = live(seed, Some(&[Fault::SlowBackup, Fault::Swap]), None, &None);
+        assert_eq!(life.state, State::Stopped, "seed {seed}");
+    }
+}
+
 #[test]
 fn a_backup_whose_plan_cannot_be_written_is_refused_and_the_run_goes_on() {
     let mut refused = 0;

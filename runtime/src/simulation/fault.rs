@@ -23,6 +23,8 @@ pub(super) enum Fault {
     /// A node stands still while it starts, and then the clock when all have joined; both together are longer than a
     /// watchdog.
     SlowStart,
+    /// The same of a backup that joins while the others wait for it; no storm has it.
+    SlowBackup,
     // These may end it.
     /// A user requests a second stop.
     Interrupt,

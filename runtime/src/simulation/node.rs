@@ -22,6 +22,7 @@ impl Sim {
                 self.instances[index].doing = Doing::Prepared;
             }
             Doing::Prepared if is_first && phase >= Phase::Connecting => self.connect(index, 0),
+            Doing::Prepared if !is_first && state != SlotState::Empty && self.is_slow_to_join(index) => {}
             Doing::Prepared if !is_first && state != SlotState::Empty => {
                 self.connect(index, self.segment.epoch + 1);
             }
@@ -53,12 +54,28 @@ impl Sim {
         }
     }
 
+    /// Lets a backup stand still once, while the others wait for it to join.
+    fn is_slow_to_join(&mut self, index: usize) -> bool {
+        let instance = &mut self.instances[index];
+        if !self.faults.contains(&Fault::SlowBackup) || std::mem::replace(&mut instance.was_slow, true) {
+            return false;
+        }
+        instance.frozen_until = instance.frozen_until.max(self.now + SLOW_START);
+        true
+    }
+
+    fn stop_clock_for_a_while(&mut self) {
+        let clocks = self.instances.iter_mut().filter(|instance| instance.role == Role::Clock);
+        clocks.for_each(|clock| clock.frozen_until = clock.frozen_until.max(self.now + SLOW_START));
+    }
+
     fn get_ready(&mut self, slot: usize, phase: Phase) {
         self.segment.slots[slot].ready = phase;
         let all_joined = self.segment.slots[..NODES].iter().all(|slot| slot.ready >= phase);
-        if all_joined && self.segment.phase < phase && self.faults.contains(&Fault::SlowStart) {
-            let clocks = self.instances.iter_mut().filter(|instance| instance.role == Role::Clock);
-            clocks.for_each(|clock| clock.frozen_until = clock.frozen_until.max(self.now + SLOW_START));
+        let is_slow_start = self.faults.contains(&Fault::SlowStart) && self.segment.phase < phase;
+        let is_slow_backup = self.faults.contains(&Fault::SlowBackup) && slot >= NODES;
+        if (all_joined && is_slow_start) || (is_slow_backup && phase == Phase::Running) {
+            self.stop_clock_for_a_while();
         }
         self.wake(Need::State);
         self.notify();

@@ -138,6 +138,8 @@ pub(super) struct Instance {
     pub(super) tick: u32,
     /// True if a sidecar has reported that it is ready, and the supervisor has not heard it yet.
     pub(super) says_ready: bool,
+    /// True if it has stood still before it joined.
+    pub(super) was_slow: bool,
 }
 
 /// Everything outside the supervisor.
@@ -264,6 +266,7 @@ impl Sim {
             shadows_until: Vec::new(),
             tick: 0,
             says_ready: false,
+            was_slow: false,
         });
         self.instances.len() - 1
     }
