@@ -30,6 +30,11 @@ pub fn parse(
         let (expected, found) = ("a log in MCAP, which can have two clocks", "another format");
         return Err(LogError::unexpected(Spot::Key("time"), expected, found, "remove the flight's `time`"));
     }
+    if !format.is_table() && is_copied_as_text(&bytes) {
+        let found = "a copy as text, in which U+FFFD stands for every byte that is no character";
+        let advice = "copy the log again as it is: binary mode of FTP, no editor and no clipboard";
+        return Err(LogError::unexpected(Spot::Whole, "the bytes of a log", found, advice));
+    }
     match format {
         Format::Csv => Ok(Box::new(CsvLog::parse(&bytes, form)?)),
         Format::Crazyflie => Ok(Box::new(CrazyflieLog::parse(bytes)?)),
@@ -38,6 +43,12 @@ pub fn parse(
         Format::Parquet => Ok(Box::new(ParquetLog::parse(bytes, form)?)),
         Format::Ulog => Ok(Box::new(Ulog::parse(bytes)?)),
     }
+}
+
+/// True if a binary log has gone through a program that took it for text: all of it is UTF-8, with characters that stand for what was none. Times and
+/// floating-point numbers of a log are no UTF-8.
+fn is_copied_as_text(bytes: &[u8]) -> bool {
+    std::str::from_utf8(bytes).is_ok_and(|text| text.matches('\u{FFFD}').count() > 2)
 }
 
 /// Returns the format of the log at `path` with these bytes: by the first of them, else by its name; CSV if neither
@@ -58,5 +69,29 @@ pub fn guess(path: &Path, bytes: &[u8]) -> Format {
             Some("ulg" | "ulog") => Format::Ulog,
             _ => Format::Csv,
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+    use crate::declaration::Format;
+    use crate::form::Form;
+    use vehicles::table::Dialect;
+
+    #[test]
+    fn a_log_that_was_copied_as_text_is_told_as_such() {
+        let mut log = b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec();
+        (0..100_u32).for_each(|number| log.extend((f64::from(number) / 3.0).to_le_bytes()));
+        let dialect = Dialect { header_line: None, header: None, delimiter: None, decimal: None };
+        let (recording, restarts, channels) = (None, "", Vec::new());
+        let form = Form { dialect: &dialect, rows_min: 0, recording, restarts, time: None, channels };
+        let told = |bytes: Vec<u8>| match parse(bytes, Format::Ulog, &form, None) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string(),
+        };
+        let copied = String::from_utf8_lossy(&log).into_owned().into_bytes();
+        assert!(told(copied).contains("a copy as text"));
+        assert!(!told(log).contains("a copy as text"));
     }
 }
