@@ -22,9 +22,10 @@ impl Sim {
                 self.instances[index].doing = Doing::Prepared;
             }
             Doing::Prepared if is_first && phase >= Phase::Connecting => self.connect(index, 0),
-            Doing::Prepared if !is_first && state != SlotState::Empty && self.is_slow_to_join(index) => {}
             Doing::Prepared if !is_first && state != SlotState::Empty => {
-                self.connect(index, self.segment.epoch + 1);
+                if !self.is_slow_to_join(index) {
+                    self.connect(index, self.segment.epoch + 1);
+                }
             }
             Doing::Connected if is_first && phase == Phase::Running => {
                 self.instances[index].doing = Doing::Waiting;
