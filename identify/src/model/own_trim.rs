@@ -2,8 +2,8 @@
 //!
 //! A trim is a constant among coloured noise. Over flights it is a random effect with mean zero: the model has what all flights share. So its best
 //! estimate is the posterior mean under the spread of the trims, Σ x y / (Σ x² + σ² / τ²). Here y are the innovations of a component up to a
-//! moment, x those of a constant of one, σ² their variance, and τ² that of the trims. The source is Searle, Casella and McCulloch, Variance Components
-//! (1992), section 7.4. docs/decisions/058-own-trims.md has what this replaced.
+//! moment, and x those of a constant of one. Their variance is σ², and that of the trims is τ². The source is Searle, Casella and McCulloch, Variance
+//! Components (1992), section 7.4. docs/decisions/058-own-trims.md has what this replaced.
 
 use crate::model::noise_model::NoiseModel;
 use crate::model::whitening::spread;
