@@ -151,7 +151,7 @@ fn a_node_that_gets_no_state_knows_what_its_predecessor_sent_last() {
                 \x20   def take_over(self, sent): self.altitude = float(sent['set_point']['altitude'])\n\
                 \x20   def step(self, tick, state, set_point): set_point['altitude'] = self.altitude\n\
                 hb.run_node(Keep)\n";
-    let swap = "[process.recorder]\nkind = \"recorder\"\n[[swap]]\nprocess = \"pilot\"\nat_tick = 100\n[swap.with]\n";
+    let swap = "[process.recorder]\nkind = \"recorder\"\n[[swap]]\nprocess = \"pilot\"\nat_tick = 200\n[swap.with]\n";
     let text = fs::read_to_string(hover(&place, code, swap)).unwrap();
     // The program is the successor of the pilot of the flight.
     let (before, program) = text.split_once("[process.pilot]\n").unwrap();
